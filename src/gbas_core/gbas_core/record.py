@@ -1,0 +1,71 @@
+"""Records: frozen dataclasses whose fields say how they travel as a table.
+
+A record is one epoch of something: observations, an ephemeris set, integrity, a solution. Its fields are either scalars
+or arrays on the satellite axis (:mod:`gbas_core.satellites`). Each field is declared once, with its unit and meaning,
+by :func:`scalar` or :func:`per_satellite`; the message codec, the documentation and the recorder all read that
+declaration. Missing is NaN everywhere.
+"""
+
+from __future__ import annotations
+
+from dataclasses import Field, dataclass, field, fields
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gbas_core.satellites import missing
+
+FloatArray = NDArray[np.float64]
+_KEY: Final = "gbas_column"
+
+
+@dataclass(frozen=True)
+class ColumnSpec:
+    """How one field of a record travels: its column names, unit and meaning."""
+
+    names: tuple[str, ...]
+    unit: str
+    doc: str
+    satellite: bool
+
+
+def scalar(unit: str, doc: str) -> Any:
+    """Declare a scalar field of a record; its default is NaN (missing)."""
+    return field(default=float("nan"), metadata={_KEY: ((), unit, doc, False)})
+
+
+def per_satellite(unit: str, doc: str, *, columns: tuple[str, ...] = ()) -> Any:
+    """Declare a field on the satellite axis; its default is all NaN (missing).
+
+    With `columns` the array has shape ``(len(columns), N_SATS)`` and each name is one column of the table; without, the
+    array has shape ``(N_SATS,)`` and the column has the field's own name.
+    """
+    leading = (len(columns),) if columns else ()
+    return field(default_factory=lambda: missing(*leading), metadata={_KEY: (columns, unit, doc, True)})
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Record:
+    """Base of all records: the epoch in GPS time.
+
+    Attributes
+    ----------
+    gps_week : int
+        GPS week, not modulo 1024.
+    tow_s : float
+        Time of week [s].
+    """
+
+    gps_week: int
+    tow_s: float
+
+
+def columns_of(record_type: type[Record]) -> tuple[tuple[Field[Any], ColumnSpec], ...]:
+    """The declared fields of a record type (without the epoch), in order, with how each travels."""
+    specs = []
+    for item in fields(record_type):
+        if _KEY in item.metadata:
+            columns, unit, doc, satellite = item.metadata[_KEY]
+            specs.append((item, ColumnSpec(columns or (item.name,), unit, doc, satellite)))
+    return tuple(specs)
