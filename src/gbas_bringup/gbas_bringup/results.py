@@ -1,0 +1,176 @@
+"""What a run leaves behind: the solution table and its summary.
+
+The same rows are written by ``gbas process``, by the demo and from a bag, so that files of the three can be compared
+byte by byte.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gbas_core.frames import geodetic_from_ecef, rot_enu_ecef
+from gbas_msgs_py.records import ProtectionEpoch, ServiceType, SolutionEpoch
+
+SOLUTION_HEADER = (
+    "gps_week",
+    "tow_s",
+    "x_m",
+    "y_m",
+    "z_m",
+    "lat_deg",
+    "lon_deg",
+    "height_m",
+    "n_sats",
+    "service",
+    "vpl_m",
+    "lpl_m",
+    "val_m",
+    "lal_m",
+    "alert",
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row:
+    """One epoch as the outside world sees it: without a valid protection level there is no position.
+
+    Attributes
+    ----------
+    position_m : (3,) array or None
+        ECEF position [m]; None when there is no position or no protection level to go with it.
+    """
+
+    gps_week: int
+    tow_s: float
+    position_m: np.ndarray | None
+    n_sats: int
+    service: str
+    vpl_m: float
+    lpl_m: float
+    val_m: float
+    lal_m: float
+    alert: bool
+
+    @classmethod
+    def of(cls, solution: SolutionEpoch, protection: ProtectionEpoch) -> Row:
+        """Join a solution and its protection levels.
+
+        Raises
+        ------
+        ValueError
+            When the two are of different epochs.
+        """
+        if (solution.gps_week, solution.tow_s) != (protection.gps_week, protection.tow_s):
+            raise ValueError(
+                f"solution of {solution.gps_week}/{solution.tow_s} s joined with protection levels of "
+                f"{protection.gps_week}/{protection.tow_s} s"
+            )
+        position = np.array([solution.x_m, solution.y_m, solution.z_m])
+        protected = bool(np.isfinite(position).all() and math.isfinite(protection.vpl_m) and math.isfinite(protection.lpl_m))
+        service = ServiceType(int(protection.service)) if math.isfinite(protection.service) else ServiceType.NONE
+        return cls(
+            gps_week=solution.gps_week,
+            tow_s=solution.tow_s,
+            position_m=position if protected else None,
+            n_sats=int(solution.n_sats) if protected else 0,
+            service="none" if service is ServiceType.NONE else service.name,
+            vpl_m=protection.vpl_m,
+            lpl_m=protection.lpl_m,
+            val_m=protection.val_m,
+            lal_m=protection.lal_m,
+            alert=not (protection.alert == 0.0),
+        )
+
+    def fields(self) -> tuple[str, ...]:
+        """The row as text; missing is empty, and floats are written so that they read back to the same bits."""
+        if self.position_m is None:
+            place = [""] * 6
+        else:
+            latitude, longitude, height = geodetic_from_ecef(self.position_m)
+            degrees = [f"{float(angle):.10f}" for angle in np.degrees([latitude, longitude])]
+            place = [*(repr(float(value)) for value in self.position_m), *degrees, f"{float(height):.4f}"]
+        levels = ["" if math.isnan(value) else repr(float(value)) for value in (self.vpl_m, self.lpl_m, self.val_m, self.lal_m)]
+        head = (str(self.gps_week), repr(float(self.tow_s)))
+        return (*head, *place, str(self.n_sats), self.service, *levels, str(int(self.alert)))
+
+
+def write_solution_csv(path: Path, rows: Iterable[Row]) -> None:
+    """Write ``solution.csv`` (see :data:`SOLUTION_HEADER`)."""
+    with path.open("w", newline="", encoding="ascii") as sink:
+        writer = csv.writer(sink, lineterminator="\n")
+        writer.writerow(SOLUTION_HEADER)
+        writer.writerows(row.fields() for row in rows)
+
+
+def error_statistics(rows: Sequence[Row], truth_m: np.ndarray) -> dict[str, Any]:
+    """Errors of the protected positions against the truth.
+
+    Parameters
+    ----------
+    truth_m : (3,) or (len(rows), 3) array
+        True antenna position [m], ECEF; NaN where unknown.
+
+    Returns
+    -------
+    dict
+        Root mean square and largest horizontal and vertical errors [m], and in how many epochs the vertical and the
+        horizontal error stayed within the vertical and lateral protection level.
+    """
+    truth = np.broadcast_to(truth_m, (len(rows), 3))
+    used = [k for k, row in enumerate(rows) if row.position_m is not None and np.isfinite(truth[k]).all()]
+    if not used:
+        return {"epochs": 0}
+    position = np.array([rows[k].position_m for k in used])
+    latitude, longitude, _ = geodetic_from_ecef(truth[used[0]])
+    error_enu = (position - truth[used]) @ rot_enu_ecef(latitude, longitude).T
+    horizontal = np.hypot(error_enu[:, 0], error_enu[:, 1])
+    vertical = np.abs(error_enu[:, 2])
+    vpl = np.array([rows[k].vpl_m for k in used])
+    lpl = np.array([rows[k].lpl_m for k in used])
+    return {
+        "epochs": len(used),
+        "horizontal_rms_m": float(np.sqrt(np.mean(horizontal**2))),
+        "vertical_rms_m": float(np.sqrt(np.mean(vertical**2))),
+        "horizontal_max_m": float(horizontal.max()),
+        "vertical_max_m": float(vertical.max()),
+        "vertical_bounded_epochs": int((vertical <= vpl).sum()),
+        "horizontal_within_lpl_epochs": int((horizontal <= lpl).sum()),
+        "vertical_worst_ratio": float((vertical / vpl).max()),
+    }
+
+
+def summarise(rows: Sequence[Row]) -> dict[str, Any]:
+    """What a run gave, in counts and ranges (the body of ``summary.json``)."""
+    solved = [row for row in rows if row.position_m is not None]
+    vpl = [row.vpl_m for row in solved]
+    lpl = [row.lpl_m for row in solved]
+    return {
+        "epochs": len(rows),
+        "epochs_solved": len(solved),
+        "epochs_alert": sum(row.alert for row in rows),
+        "service_epochs": dict(sorted(Counter(row.service for row in rows).items())),
+        "first_epoch": [rows[0].gps_week, rows[0].tow_s] if rows else None,
+        "last_epoch": [rows[-1].gps_week, rows[-1].tow_s] if rows else None,
+        "first_solved_epoch": [solved[0].gps_week, solved[0].tow_s] if solved else None,
+        "satellites_min_max": [min(r.n_sats for r in solved), max(r.n_sats for r in solved)] if solved else None,
+        "vpl_m_min_median_max": _three(vpl),
+        "lpl_m_min_median_max": _three(lpl),
+    }
+
+
+def _three(values: Sequence[float]) -> list[float] | None:
+    return [min(values), float(np.median(values)), max(values)] if values else None
+
+
+def write_json(path: Path, document: dict[str, Any]) -> None:
+    """Write a JSON document for people and programs to read."""
+    path.write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", encoding="utf-8")
