@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
+from typing import Final
 
-from gbas_core.record import FloatArray, Record, per_satellite, scalar
+import numpy as np
+
+from gbas_core.gpstime import SECONDS_PER_WEEK
+from gbas_core.record import FloatArray, Record, columns_of, per_satellite, scalar
+from gbas_core.satellites import IS_GPS, N_SATS, missing
 
 
 class NavigationMessage(IntEnum):
@@ -53,3 +58,111 @@ class Ephemeris(Record):
     group_delay_e5b_s: FloatArray = per_satellite("s", "Galileo BGD(E1,E5b); NaN for GPS")
     health: FloatArray = per_satellite("-", "signal health, 0 is healthy")
     accuracy_m: FloatArray = per_satellite("m", "URA or SISA")
+
+
+VALIDITY_S: Final[FloatArray] = np.where(IS_GPS, 2 * 3600.0, 4 * 3600.0)
+"""Largest |t - toe| an ephemeris is used at, on the satellite axis.
+
+Source: GPS, half of the fit interval of 4 h (IS-GPS-200N 20.3.4.4); Galileo, 4 h (OS Service Definition Document).
+"""
+STORE_DEPTH: Final = 4
+
+_FIELDS: Final[tuple[str, ...]] = tuple(item.name for item, spec in columns_of(Ephemeris) if spec.satellite)
+_ROW: Final[dict[str, int]] = {name: row for row, name in enumerate(_FIELDS)}
+# Rows of the store after the ephemeris' own fields.
+_RECEIVED_WEEK: Final = len(_FIELDS)
+_RECEIVED_TOW: Final = _RECEIVED_WEEK + 1
+_SIMULATED: Final = _RECEIVED_WEEK + 2
+_COMPLETE: Final = _RECEIVED_WEEK + 3
+_N_ROWS: Final = _RECEIVED_WEEK + 4
+_EVERY_SATELLITE: Final = np.arange(N_SATS)
+
+
+def is_complete(ephemeris: Ephemeris) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """Mask ``(N_SATS,)`` of the satellites with everything their message should hold.
+
+    GPS LNAV has no BGD(E1,E5b); Galileo has no IODC; F/NAV has no BGD(E1,E5b).
+    """
+    finite = np.isfinite(np.stack([getattr(ephemeris, name) for name in _FIELDS]))
+    message = ephemeris.message
+    finite[_ROW["iodc"]] |= message != NavigationMessage.GPS_LNAV
+    finite[_ROW["group_delay_e5b_s"]] |= message != NavigationMessage.GALILEO_INAV
+    own_message = np.where(IS_GPS, message == NavigationMessage.GPS_LNAV, message != NavigationMessage.GPS_LNAV)
+    return np.asarray(finite.all(axis=0) & own_message)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class EphemerisStore:
+    """The ephemerides received so far, the last few of each satellite. Frozen: adding makes a new store.
+
+    Attributes
+    ----------
+    values : (STORE_DEPTH, rows, N_SATS) array
+        Newest first: the fields of :class:`Ephemeris` and when each was received. Not to be written to.
+    """
+
+    values: FloatArray = field(default_factory=lambda: missing(STORE_DEPTH, _N_ROWS))
+
+    def add(self, ephemeris: Ephemeris) -> EphemerisStore:
+        """Store with the ephemerides of one reception added; one that is stored already changes nothing."""
+        new = np.full((_N_ROWS, N_SATS), np.nan)
+        for row, name in enumerate(_FIELDS):
+            new[row] = getattr(ephemeris, name)
+        new[_RECEIVED_WEEK] = ephemeris.gps_week
+        new[_RECEIVED_TOW] = ephemeris.tow_s
+        new[_SIMULATED] = ephemeris.simulated
+        new[_COMPLETE] = is_complete(ephemeris)
+        present = np.isfinite(ephemeris.message)
+        old, fields = self.values[:, : len(_FIELDS)], new[: len(_FIELDS)]
+        known = ((old == fields) | (np.isnan(old) & np.isnan(fields))).all(axis=1).any(axis=0)
+        push = present & ~known
+        if not push.any():
+            return self
+        shifted = np.concatenate([new[np.newaxis], self.values[:-1]])
+        values = np.where(push, shifted, self.values)
+        values.flags.writeable = False
+        return EphemerisStore(values=values)
+
+    def usable(self, gps_week: int, tow_s: float, settle_s: float) -> Ephemeris:
+        """The ephemeris of each satellite to use at a time: the latest received that has settled.
+
+        Parameters
+        ----------
+        gps_week, tow_s
+            The time.
+        settle_s : float
+            How long ago an ephemeris must have been received [s].
+
+        Returns
+        -------
+        Ephemeris
+            Its epoch is the given time. A satellite is missing (NaN) without an ephemeris that was received at least
+            `settle_s` ago, is complete and within :data:`VALIDITY_S`; and whenever the newest ephemeris received,
+            settled or not, does not say that the satellite is healthy.
+        """
+        age = self._age_s(gps_week, tow_s)
+        return self._pick(gps_week, tow_s, age, age >= settle_s)
+
+    def matching(self, iod: FloatArray, gps_week: int, tow_s: float) -> Ephemeris:
+        """The ephemeris of each satellite with the given issue of data ``(N_SATS,)``; missing as in :meth:`usable`."""
+        age = self._age_s(gps_week, tow_s)
+        return self._pick(gps_week, tow_s, age, (age >= 0.0) & (self.values[:, _ROW["iod"]] == iod))
+
+    def _age_s(self, gps_week: int, tow_s: float) -> FloatArray:
+        weeks = gps_week - self.values[:, _RECEIVED_WEEK]
+        return np.asarray(weeks * SECONDS_PER_WEEK + (tow_s - self.values[:, _RECEIVED_TOW]))
+
+    def _pick(self, gps_week: int, tow_s: float, age_s: FloatArray, candidate: FloatArray) -> Ephemeris:
+        values = self.values
+        since_toe = (gps_week - values[:, _ROW["toe_week"]]) * SECONDS_PER_WEEK + (tow_s - values[:, _ROW["toe_tow_s"]])
+        candidate = candidate & (np.abs(since_toe) <= VALIDITY_S) & (values[:, _COMPLETE] == 1.0)
+        chosen = np.where(candidate, age_s, np.inf).argmin(axis=0)
+        newest = np.where(age_s >= 0.0, age_s, np.inf).argmin(axis=0)
+        health = values[:, _ROW["health"]]
+        healthy = (health[chosen, _EVERY_SATELLITE] == 0.0) & (health[newest, _EVERY_SATELLITE] == 0.0)
+        found = candidate[chosen, _EVERY_SATELLITE] & healthy
+        picked = np.where(found, values[chosen, :, _EVERY_SATELLITE].T, np.nan)
+        picked.flags.writeable = False
+        simulated = float((picked[_SIMULATED] > 0.0).any()) if found.any() else float("nan")
+        fields = {name: picked[row] for row, name in enumerate(_FIELDS)}
+        return Ephemeris(gps_week=gps_week, tow_s=tow_s, simulated=simulated, **fields)
