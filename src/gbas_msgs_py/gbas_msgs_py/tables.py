@@ -1,0 +1,77 @@
+"""The tables of the contract: one schema a record type, registered once."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gbas_core.ephemeris import Ephemeris
+from gbas_core.observations import ObservationEpoch
+from gbas_core.record import Record, scalar
+from gbas_msgs_py.records import IntegrityEpoch, ProtectionEpoch, SolutionEpoch
+from gbas_msgs_py.schema import LABEL_PREFIX, SchemaError, TableSchema
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ProgressEpoch(Record):
+    """A node has finished with this epoch: what a driver of the replay counts (flow control)."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TruthEpoch(Record):
+    """Where the antenna truly was; only a simulator knows, and no part of the ground or airborne side reads it."""
+
+    x_m: float = scalar("m", "ECEF position")
+    y_m: float = scalar("m", "ECEF position")
+    z_m: float = scalar("m", "ECEF position")
+    vx_mps: float = scalar("m/s", "ECEF velocity")
+    vy_mps: float = scalar("m/s", "ECEF velocity")
+    vz_mps: float = scalar("m/s", "ECEF velocity")
+
+
+OBSERVATIONS: Final = TableSchema("observations", 1, ObservationEpoch)
+EPHEMERIS: Final = TableSchema("ephemeris", 1, Ephemeris)
+INTEGRITY: Final = TableSchema("integrity", 1, IntegrityEpoch)
+SOLUTION: Final = TableSchema("solution", 1, SolutionEpoch)
+PROTECTION: Final = TableSchema("protection", 1, ProtectionEpoch)
+PROGRESS: Final = TableSchema("progress", 1, ProgressEpoch)
+TRUTH: Final = TableSchema("truth", 1, TruthEpoch)
+
+SCHEMAS: Final[dict[str, TableSchema[Any]]] = {
+    schema.name: schema for schema in (OBSERVATIONS, EPHEMERIS, INTEGRITY, SOLUTION, PROTECTION, PROGRESS, TRUTH)
+}
+
+
+def schema_of(label: str) -> TableSchema[Any]:
+    """The schema a label names.
+
+    Raises
+    ------
+    SchemaError
+        For a label of another kind, an unknown schema or another version. The columns are checked by ``decode``.
+    """
+    found = label.partition(":")[0]
+    parts = found.split("/")
+    if not found.startswith(LABEL_PREFIX) or len(parts) != 3:
+        raise SchemaError(f"{label[:80]!r} is not a label of the form '{LABEL_PREFIX}<name>/<version>: <columns>'")
+    schema = SCHEMAS.get(parts[1])
+    if schema is None:
+        raise SchemaError(f"schema {parts[1]!r} is unknown, expected one of {', '.join(SCHEMAS)}")
+    if parts[2] != str(schema.version):
+        raise SchemaError(f"schema {parts[1]!r} has version {parts[2][:20]!r}, expected {schema.version}")
+    return schema
+
+
+def decode_table(label: str, data: NDArray[np.float64]) -> Record:
+    """Record of a table of any registered schema; raises SchemaError as :meth:`TableSchema.decode` does."""
+    record: Record = schema_of(label).decode(label, data)
+    return record
+
+
+def schema_dictionary() -> str:
+    """All schemas as one JSON document: what is published on the schemas topic and written into bags."""
+    return json.dumps({"schemas": [schema.describe() for schema in SCHEMAS.values()]}, ensure_ascii=True)
