@@ -1,9 +1,9 @@
 """Joining streams by epoch, without a clock and without ROS.
 
 Epochs are keys: milliseconds since the start of GPS time (:func:`gbas_core.gpstime.epoch_key`). Data decide when an
-epoch is complete; wall-clock deadlines, whose times the caller passes in, decide only when something is missing. What is
-given out depends on the data alone as long as no deadline passes, whatever the order in which streams interleave: that
-is why live, accelerated and offline runs, which all join through this module, agree bit for bit.
+epoch is complete; wall-clock deadlines, whose times the caller passes in, decide only when something is missing. What
+is given out depends on the data alone as long as no deadline passes, whatever the order in which streams interleave:
+that is why live, accelerated and offline runs, which all join through this module, agree bit for bit.
 """
 
 from __future__ import annotations
