@@ -1,0 +1,51 @@
+"""The VDB's two cyclic redundancy checks, byte-table driven.
+
+Both registers shift towards their most significant bit and are fed with bits in the order of the air. Bytes hold the
+first bit on the air in their least significant bit, so both are computed with reflected tables, and the register comes
+out reflected: its bit 0 is the coefficient of the highest power, which is transmitted first. The result is therefore
+the integer of the transmitted field, least significant bit first, like any other field.
+
+Source: Annex 10 Volume I, Appendix B, 3.6.3.3.3 (CRC-32Q) and 3.6.3.2.2.3 (ephemeris CRC); facts 1.4 and 1.7.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+# x^32 + x^31 + x^24 + x^22 + x^16 + x^14 + x^8 + x^7 + x^5 + x^3 + x + 1 without its highest term.
+CRC32_POLYNOMIAL: Final = 0x814141AB
+# x^16 + x^12 + x^5 + 1 without its highest term.
+CRC16_POLYNOMIAL: Final = 0x1021
+
+
+def _reflected_table(polynomial: int, width: int) -> tuple[int, ...]:
+    reflected = int(f"{polynomial:0{width}b}"[::-1], 2)
+    table = []
+    for byte in range(256):
+        register = byte
+        for _ in range(8):
+            register = (register >> 1) ^ (reflected if register & 1 else 0)
+        table.append(register)
+    return tuple(table)
+
+
+_TABLE_32: Final = _reflected_table(CRC32_POLYNOMIAL, 32)
+_TABLE_16: Final = _reflected_table(CRC16_POLYNOMIAL, 16)
+
+
+def crc32q(data: bytes) -> int:
+    """CRC of a message block or FAS block: the 32-bit field, first transmitted bit least significant."""
+    table = _TABLE_32
+    register = 0
+    for byte in data:
+        register = table[(register ^ byte) & 0xFF] ^ (register >> 8)
+    return register
+
+
+def crc16(data: bytes) -> int:
+    """Ephemeris CRC over bytes fed least significant bit first: the 16-bit field of the type 1 message."""
+    table = _TABLE_16
+    register = 0
+    for byte in data:
+        register = table[(register ^ byte) & 0xFF] ^ (register >> 8)
+    return register

@@ -1,0 +1,432 @@
+"""The kinds of entry a VDB field table has, and the interpreter that turns tables and records into bits and back.
+
+A :class:`Layout` is a record type and its entries in the order of transmission. Entries are data: bits, scale, bounds,
+special codes, rounding. :func:`encode` and :func:`decode` interpret them. Physical values are in SI units and radians;
+missing is NaN (quantities) or None (designators), never a default value.
+
+Rounding is to the nearest count, unless the entry says otherwise: integrity bounds (sigmas, P, multipliers) round up,
+limits (alert limits, maximum distance, availability) round down, so that quantisation never makes a value optimistic.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cached_property
+from operator import attrgetter
+from types import SimpleNamespace
+from typing import Any, Final, Literal
+
+from gbas_msgs_py.vdb.bits import BitReader, BitWriter
+from gbas_msgs_py.vdb.errors import FieldError, VdbError
+
+# A value that was computed from counts (0.02 * 3) must round up to the same counts: this part of one count is allowed.
+_ROUNDING_SLACK: Final = 1e-6
+
+Rounding = Literal["nearest", "up", "down"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Number:
+    """A quantity: value = offset + scale * raw.
+
+    Attributes
+    ----------
+    name, unit, doc : str
+        Name of the record's attribute, SI unit ("" for a plain count or code), meaning.
+    bits : int
+    signed : bool
+        Two's complement.
+    scale : Fraction, float or None
+        Value of one count; None for integers.
+    offset : int
+    minimum, maximum : int or None
+        Bounds of the raw count; by default what the bits hold.
+    codes : mapping of raw count to value
+        Special codes: the values NaN, None or infinity.
+    saturates : bool
+        Values above the maximum are sent as the maximum: the standard defines that code as "this much or more".
+    rounding
+    valid_if : str or None
+        Name of another entry: when that one is missing (or an empty group), this one is missing too, and sent as zero.
+    """
+
+    name: str
+    bits: int
+    unit: str = ""
+    doc: str = ""
+    signed: bool = False
+    scale: Fraction | float | None = None
+    offset: int = 0
+    minimum: int | None = None
+    maximum: int | None = None
+    codes: Mapping[int, float | None] = field(default_factory=dict)
+    saturates: bool = False
+    rounding: Rounding = "nearest"
+    valid_if: str | None = None
+
+    @cached_property
+    def bounds(self) -> tuple[int, int]:
+        """Smallest and largest raw count of an ordinary value."""
+        low, high = (-(1 << (self.bits - 1)), (1 << (self.bits - 1)) - 1) if self.signed else (0, (1 << self.bits) - 1)
+        return (low if self.minimum is None else self.minimum, high if self.maximum is None else self.maximum)
+
+    @cached_property
+    def _ratio(self) -> tuple[float, float]:
+        if isinstance(self.scale, Fraction):
+            return float(self.scale.numerator), float(self.scale.denominator)
+        return (1.0 if self.scale is None else float(self.scale)), 1.0
+
+    @cached_property
+    def _raw_of_none(self) -> int | None:
+        return next((raw for raw, value in self.codes.items() if value is None), None)
+
+    @cached_property
+    def _raw_of_nan(self) -> int | None:
+        return next((raw for raw, value in self.codes.items() if value is not None and value != value), None)
+
+    @cached_property
+    def _raw_of_infinity(self) -> int | None:
+        return next((raw for raw, value in self.codes.items() if value == math.inf), None)
+
+    def physical(self, raw: int) -> Any:
+        """Physical value of a raw count."""
+        if self.scale is None:
+            return raw + self.offset
+        # The offset is added before the division: one rounding, so that decimal values come out as they are written.
+        numerator, denominator = self._ratio
+        return (self.offset * denominator + raw * numerator) / denominator
+
+    def to_raw(self, value: Any) -> int:
+        """Raw count of a physical value.
+
+        Raises
+        ------
+        FieldError
+            For a missing value the field has no code for, and for one out of bounds.
+        """
+        if value is None or value != value or value in (math.inf, -math.inf):
+            return self._special(value)
+        numerator, denominator = self._ratio
+        counts = (value - self.offset) * denominator / numerator
+        if self.scale is None:
+            raw = int(value) - self.offset
+            if raw != counts:
+                raise FieldError(f"{self.name} = {value!r} is not an integer")
+        elif self.rounding == "nearest":
+            raw = round(counts)
+        elif self.rounding == "up":
+            raw = math.ceil(counts - _ROUNDING_SLACK)
+        else:
+            raw = math.floor(counts + _ROUNDING_SLACK)
+        low, high = self.bounds
+        if low <= raw <= high and raw not in self.codes:
+            return raw
+        if raw > high and self.saturates:
+            return high
+        raise self._out_of_bounds(value)
+
+    def _special(self, value: Any) -> int:
+        if value is None:
+            raw = self._raw_of_none
+        elif value != value:
+            raw = self._raw_of_nan
+        else:
+            raw = self._raw_of_infinity if value > 0 else None
+        if raw is None:
+            raise FieldError(f"{self.name} = {value!r}: the field has no code for it")
+        return raw
+
+    def _out_of_bounds(self, value: Any) -> FieldError:
+        low, high = self.bounds
+        unit = f" {self.unit}" if self.unit else ""
+        return FieldError(f"{self.name} = {value!r} outside {self.physical(low)!r} to {self.physical(high)!r}{unit}")
+
+    def from_raw(self, raw: int) -> Any:
+        """Physical value of a count as read (unsigned).
+
+        Raises
+        ------
+        FieldError
+            For a count the standard does not allow.
+        """
+        if self.signed and raw >> (self.bits - 1):
+            raw -= 1 << self.bits
+        if raw in self.codes:
+            return self.codes[raw]
+        low, high = self.bounds
+        if not low <= raw <= high:
+            raise self._out_of_bounds(self.physical(raw))
+        return self.physical(raw)
+
+    @property
+    def missing(self) -> float | None:
+        """What stands for a missing value: None for integers, NaN for quantities."""
+        return None if self.scale is None else math.nan
+
+
+@dataclass(frozen=True, kw_only=True)
+class Choice:
+    """A code with named values; the position in `values` is the raw count. None is a value without a meaning."""
+
+    name: str
+    bits: int
+    values: tuple[Any, ...]
+    doc: str = ""
+    unit: str = ""
+    valid_if: None = None
+
+    def to_raw(self, value: Any) -> int:
+        """Raw count of a named value."""
+        for raw, known in enumerate(self.values):
+            if known == value and isinstance(value, type(known)):
+                return raw
+        raise FieldError(f"{self.name} = {value!r} is not one of {', '.join(repr(known) for known in self.values)}")
+
+    def from_raw(self, raw: int) -> Any:
+        """Named value of a raw count."""
+        if raw >= len(self.values):
+            raise FieldError(f"{self.name} = {raw} has no meaning; {len(self.values)} values are defined")
+        return self.values[raw]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Text:
+    """Characters A-Z, 0-9 and space by their lowest six IA-5 bits; the rightmost is sent first; padded at the right."""
+
+    name: str
+    characters: int
+    bits_per_character: int
+    doc: str = ""
+    unit: str = ""
+    valid_if: None = None
+
+    @property
+    def bits(self) -> int:
+        """Bits of the whole text."""
+        return self.characters * self.bits_per_character
+
+    def to_raw(self, value: Any) -> int:
+        """Raw integer of a text."""
+        if not isinstance(value, str) or len(value) > self.characters:
+            raise FieldError(f"{self.name} = {value!r} is not a text of at most {self.characters} characters")
+        raw = 0
+        for character in value.ljust(self.characters):
+            if character not in _ALPHABET:
+                raise FieldError(f"{self.name} = {value!r}: character {character!r} is not one of A-Z, 0-9 and space")
+            raw = (raw << self.bits_per_character) | (ord(character) & 0x3F)
+        return raw
+
+    def from_raw(self, raw: int) -> str:
+        """Text of a raw integer, without the padding."""
+        mask = (1 << self.bits_per_character) - 1
+        text = ""
+        for _ in range(self.characters):
+            code = raw & mask
+            if code not in _CHARACTER_OF_CODE:
+                raise FieldError(f"{self.name}: character code {code:#04x} is not one of A-Z, 0-9 and space")
+            text = _CHARACTER_OF_CODE[code] + text
+            raw >>= self.bits_per_character
+        return text.rstrip(" ")
+
+
+_ALPHABET: Final = frozenset("ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789 ")
+_CHARACTER_OF_CODE: Final = {ord(character) & 0x3F: character for character in _ALPHABET}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Spare:
+    """Bits without a meaning: sent as zero, not looked at when received."""
+
+    bits: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Vector:
+    """A fixed number of equal quantities: a tuple in the record."""
+
+    name: str
+    length: int
+    item: Number
+
+
+@dataclass(frozen=True, kw_only=True)
+class Switch:
+    """An entry whose table depends on another value of the record, which may come later in the message.
+
+    Attributes
+    ----------
+    on : str
+        Dotted name of the value.
+    cases : mapping
+        Entry by value; all have the same bits and name.
+    default : Number
+    """
+
+    on: str
+    cases: Mapping[Any, Number]
+    default: Number
+
+    def chosen(self, record: Any) -> Number:
+        """The entry that applies to a record."""
+        return self.cases.get(attrgetter(self.on)(record), self.default)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Count:
+    """How many items the group `of` has; not in the record."""
+
+    of: str
+    bits: int
+    maximum: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Group:
+    """Items of one layout, as many as its :class:`Count` says: a tuple of records in the record."""
+
+    name: str
+    layout: Layout
+    doc: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Part:
+    """A record inside a record."""
+
+    name: str
+    layout: Layout
+
+
+Entry = Number | Choice | Text | Spare | Vector | Switch | Count | Group | Part
+
+
+@dataclass(frozen=True, kw_only=True)
+class Layout:
+    """A record type and its entries in the order of transmission."""
+
+    record: Callable[..., Any]
+    entries: tuple[Entry, ...]
+
+    @cached_property
+    def conditional(self) -> tuple[Number, ...]:
+        """Entries that are missing when another is."""
+        return tuple(entry for entry in self.entries if isinstance(entry, Number) and entry.valid_if is not None)
+
+    @cached_property
+    def switched(self) -> tuple[Switch, ...]:
+        """Entries decoded after the others."""
+        return tuple(entry for entry in self.entries if isinstance(entry, Switch))
+
+
+def is_missing(value: Any) -> bool:
+    """Whether a value says nothing: None, NaN or an empty group."""
+    return value is None or value == () or value != value
+
+
+def encode(layout: Layout, record: Any, writer: BitWriter) -> None:
+    """Append a record's fields to `writer`.
+
+    Raises
+    ------
+    FieldError
+        Naming the field, its value and the bound; group items are named with their position.
+    """
+    for entry in layout.entries:
+        if isinstance(entry, Number):
+            writer.put(_number_to_raw(entry, record), entry.bits)
+        elif isinstance(entry, (Choice, Text)):
+            writer.put(entry.to_raw(getattr(record, entry.name)), entry.bits)
+        elif isinstance(entry, Spare):
+            writer.put(0, entry.bits)
+        elif isinstance(entry, Vector):
+            _encode_vector(entry, getattr(record, entry.name), writer)
+        elif isinstance(entry, Count):
+            count = len(getattr(record, entry.of))
+            if count > entry.maximum:
+                raise FieldError(f"{entry.of}: {count} items, at most {entry.maximum} fit")
+            writer.put(count, entry.bits)
+        elif isinstance(entry, Switch):
+            chosen = entry.chosen(record)
+            writer.put(_number_to_raw(chosen, record), chosen.bits)
+        elif isinstance(entry, Group):
+            _encode_group(entry, getattr(record, entry.name), writer)
+        else:
+            encode(entry.layout, getattr(record, entry.name), writer)
+
+
+def _number_to_raw(entry: Number, record: Any) -> int:
+    value = getattr(record, entry.name)
+    if entry.valid_if is not None and is_missing(value) and is_missing(getattr(record, entry.valid_if)):
+        return 0
+    return entry.to_raw(value)
+
+
+def _encode_vector(entry: Vector, values: Any, writer: BitWriter) -> None:
+    if len(values) != entry.length:
+        raise FieldError(f"{entry.name} has {len(values)} values, not {entry.length}")
+    for value in values:
+        writer.put(entry.item.to_raw(value), entry.item.bits)
+
+
+def _encode_group(entry: Group, items: Any, writer: BitWriter) -> None:
+    # Each item is collected apart: shifting a short integer is cheaper than shifting the whole message.
+    for position, item in enumerate(items):
+        part = BitWriter()
+        try:
+            encode(entry.layout, item, part)
+        except FieldError as error:
+            raise FieldError(f"{entry.name}[{position}]: {error}") from None
+        writer.put(part.value, part.n_bits)
+
+
+def decode(layout: Layout, reader: BitReader) -> Any:
+    """Read one record.
+
+    Raises
+    ------
+    VdbError
+        When the bits end too early.
+    FieldError
+        For a count the standard does not allow.
+    """
+    try:
+        return _decode(layout, reader)
+    except EOFError as error:
+        raise VdbError(f"too short: {error}") from None
+
+
+def _decode(layout: Layout, reader: BitReader) -> Any:
+    values: dict[str, Any] = {}
+    counts: dict[str, int] = {}
+    raw_of_switch: dict[int, int] = {}
+    for entry in layout.entries:
+        if isinstance(entry, (Number, Choice, Text)):
+            values[entry.name] = entry.from_raw(reader.take(entry.bits))
+        elif isinstance(entry, Spare):
+            reader.take(entry.bits)
+        elif isinstance(entry, Vector):
+            item = entry.item
+            values[entry.name] = tuple([item.from_raw(reader.take(item.bits)) for _ in range(entry.length)])
+        elif isinstance(entry, Count):
+            counts[entry.of] = _checked_count(entry, reader.take(entry.bits))
+        elif isinstance(entry, Group):
+            values[entry.name] = tuple([_decode(entry.layout, reader) for _ in range(counts[entry.name])])
+        elif isinstance(entry, Switch):
+            raw_of_switch[id(entry)] = reader.take(entry.default.bits)
+        else:
+            values[entry.name] = _decode(entry.layout, reader)
+    for switch in layout.switched:
+        values[switch.default.name] = switch.chosen(SimpleNamespace(**values)).from_raw(raw_of_switch[id(switch)])
+    for number in layout.conditional:
+        if is_missing(values[str(number.valid_if)]):
+            values[number.name] = number.missing
+    return layout.record(**values)
+
+
+def _checked_count(entry: Count, count: int) -> int:
+    if count > entry.maximum:
+        raise FieldError(f"{entry.of}: {count} items, at most {entry.maximum} are allowed")
+    return count
