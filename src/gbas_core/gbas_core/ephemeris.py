@@ -7,6 +7,7 @@ from enum import IntEnum
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gbas_core.gpstime import SECONDS_PER_WEEK
 from gbas_core.record import FloatArray, Record, columns_of, per_satellite, scalar
@@ -67,10 +68,11 @@ Source: GPS, half of the fit interval of 4 h (IS-GPS-200N 20.3.4.4); Galileo, 4 
 """
 STORE_DEPTH: Final = 4
 
-_FIELDS: Final[tuple[str, ...]] = tuple(item.name for item, spec in columns_of(Ephemeris) if spec.satellite)
-_ROW: Final[dict[str, int]] = {name: row for row, name in enumerate(_FIELDS)}
+FIELDS: Final[tuple[str, ...]] = tuple(item.name for item, spec in columns_of(Ephemeris) if spec.satellite)
+"""Names of the per-satellite fields of :class:`Ephemeris`, in order."""
+_ROW: Final[dict[str, int]] = {name: row for row, name in enumerate(FIELDS)}
 # Rows of the store after the ephemeris' own fields.
-_RECEIVED_WEEK: Final = len(_FIELDS)
+_RECEIVED_WEEK: Final = len(FIELDS)
 _RECEIVED_TOW: Final = _RECEIVED_WEEK + 1
 _SIMULATED: Final = _RECEIVED_WEEK + 2
 _COMPLETE: Final = _RECEIVED_WEEK + 3
@@ -78,13 +80,16 @@ _N_ROWS: Final = _RECEIVED_WEEK + 4
 _EVERY_SATELLITE: Final = np.arange(N_SATS)
 
 
-def is_complete(ephemeris: Ephemeris) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def is_complete(ephemeris: Ephemeris) -> NDArray[np.bool_]:
     """Mask ``(N_SATS,)`` of the satellites with everything their message should hold.
 
-    GPS LNAV has no BGD(E1,E5b); Galileo has no IODC; F/NAV has no BGD(E1,E5b).
+    GPS LNAV has no BGD(E1,E5b), Galileo no IODC, F/NAV no BGD(E1,E5b). GPS is complete without an accuracy, which
+    nothing is computed from; Galileo is not, since a satellite without an accuracy prediction is marginal (Galileo OS
+    Service Definition Document 1.3, 2.3.1.4).
     """
-    finite = np.isfinite(np.stack([getattr(ephemeris, name) for name in _FIELDS]))
+    finite = np.isfinite(np.stack([getattr(ephemeris, name) for name in FIELDS]))
     message = ephemeris.message
+    finite[_ROW["accuracy_m"]] |= message == NavigationMessage.GPS_LNAV
     finite[_ROW["iodc"]] |= message != NavigationMessage.GPS_LNAV
     finite[_ROW["group_delay_e5b_s"]] |= message != NavigationMessage.GALILEO_INAV
     own_message = np.where(IS_GPS, message == NavigationMessage.GPS_LNAV, message != NavigationMessage.GPS_LNAV)
@@ -106,14 +111,14 @@ class EphemerisStore:
     def add(self, ephemeris: Ephemeris) -> EphemerisStore:
         """Store with the ephemerides of one reception added; one that is stored already changes nothing."""
         new = np.full((_N_ROWS, N_SATS), np.nan)
-        for row, name in enumerate(_FIELDS):
+        for row, name in enumerate(FIELDS):
             new[row] = getattr(ephemeris, name)
         new[_RECEIVED_WEEK] = ephemeris.gps_week
         new[_RECEIVED_TOW] = ephemeris.tow_s
         new[_SIMULATED] = ephemeris.simulated
         new[_COMPLETE] = is_complete(ephemeris)
         present = np.isfinite(ephemeris.message)
-        old, fields = self.values[:, : len(_FIELDS)], new[: len(_FIELDS)]
+        old, fields = self.values[:, : len(FIELDS)], new[: len(FIELDS)]
         known = ((old == fields) | (np.isnan(old) & np.isnan(fields))).all(axis=1).any(axis=0)
         push = present & ~known
         if not push.any():
@@ -152,7 +157,7 @@ class EphemerisStore:
         weeks = gps_week - self.values[:, _RECEIVED_WEEK]
         return np.asarray(weeks * SECONDS_PER_WEEK + (tow_s - self.values[:, _RECEIVED_TOW]))
 
-    def _pick(self, gps_week: int, tow_s: float, age_s: FloatArray, candidate: FloatArray) -> Ephemeris:
+    def _pick(self, gps_week: int, tow_s: float, age_s: FloatArray, candidate: NDArray[np.bool_]) -> Ephemeris:
         values = self.values
         since_toe = (gps_week - values[:, _ROW["toe_week"]]) * SECONDS_PER_WEEK + (tow_s - values[:, _ROW["toe_tow_s"]])
         candidate = candidate & (np.abs(since_toe) <= VALIDITY_S) & (values[:, _COMPLETE] == 1.0)
@@ -164,5 +169,5 @@ class EphemerisStore:
         picked = np.where(found, values[chosen, :, _EVERY_SATELLITE].T, np.nan)
         picked.flags.writeable = False
         simulated = float((picked[_SIMULATED] > 0.0).any()) if found.any() else float("nan")
-        fields = {name: picked[row] for row, name in enumerate(_FIELDS)}
+        fields = {name: picked[row] for row, name in enumerate(FIELDS)}
         return Ephemeris(gps_week=gps_week, tow_s=tow_s, simulated=simulated, **fields)

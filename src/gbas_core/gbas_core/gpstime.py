@@ -75,15 +75,12 @@ def add_seconds(week: int, tow_s: float, seconds: float) -> tuple[int, float]:
 @overload
 def seconds_between(week_a: float, tow_a_s: float, week_b: float, tow_b_s: float) -> float: ...
 @overload
-def seconds_between(
-    week_a: ArrayLike, tow_a_s: ArrayLike, week_b: ArrayLike, tow_b_s: ArrayLike
-) -> FloatArray | float: ...
-def seconds_between(week_a: ArrayLike, tow_a_s: ArrayLike, week_b: ArrayLike, tow_b_s: ArrayLike) -> FloatArray | float:
-    """Time from `a` to `b` [s] (b less a), across weeks; scalars or arrays that broadcast. NaN stays NaN."""
-    if all(isinstance(value, (int, float)) for value in (week_a, tow_a_s, week_b, tow_b_s)):
-        return (week_b - week_a) * SECONDS_PER_WEEK + (tow_b_s - tow_a_s)  # type: ignore[operator]
+def seconds_between(week_a: ArrayLike, tow_a_s: ArrayLike, week_b: ArrayLike, tow_b_s: ArrayLike) -> FloatArray: ...
+def seconds_between(week_a: ArrayLike, tow_a_s: ArrayLike, week_b: ArrayLike, tow_b_s: ArrayLike) -> float | FloatArray:
+    """Time from `a` to `b` [s] (b less a), across weeks; numbers, or arrays that broadcast. NaN stays NaN."""
     weeks = np.subtract(week_b, week_a, dtype=np.float64)
-    return np.asarray(weeks * SECONDS_PER_WEEK + np.subtract(tow_b_s, tow_a_s, dtype=np.float64))
+    seconds = weeks * SECONDS_PER_WEEK + np.subtract(tow_b_s, tow_a_s, dtype=np.float64)
+    return float(seconds) if np.ndim(seconds) == 0 else np.asarray(seconds)
 
 
 def epoch_key(week: int, tow_s: float) -> int:
