@@ -1,14 +1,14 @@
 """The final approach: its frame, deviations from its path, and alert limits.
 
 The approach frame has its origin at the landing threshold point (LTP), x forward along the final course in the plane
-tangent to the ellipsoid at the LTP, y left, z up. The final approach path is the straight line through the datum crossing
-point (LTP raised by the threshold crossing height) with slope tan(GPA) in the plane y = 0. Distances to the threshold are
-positive before it.
+tangent to the ellipsoid at the LTP, y left, z up. The final approach path is the straight line through the datum
+crossing point (LTP raised by the threshold crossing height) with slope tan(GPA) in the plane y = 0. Distances to the
+threshold are positive before it.
 
 Deviations are positive left of the course and above the path, rectilinear and angular alike.
 
-Source: ICAO Annex 10 Vol. I, App. B 3.6.4.5 and att. D (FAS data block), tables B-68 and B-69 (alert limits); RTCA DO-253
-2.3.11 (deviations).
+Source: ICAO Annex 10 Vol. I, App. B 3.6.4.5 and att. D (FAS data block), tables B-68 and B-69 (alert limits); RTCA
+DO-253 2.3.11 (deviations).
 """
 
 from __future__ import annotations
@@ -98,8 +98,8 @@ class FinalApproach:
     rpds : int
         Reference path data selector, 0 to 48.
     gerp_offset_m : float
-        Offset of the GERP from the course, positive left [m]. Known is its size, uncertain whether all equipment uses it:
-        0 puts the origin of the vertical deviation at the GPIP.
+        Offset of the GERP from the course, positive left [m]. Known is its size, uncertain whether all equipment uses
+        it: 0 puts the origin of the vertical deviation at the GPIP.
     """
 
     ltp_lat_rad: float
@@ -229,7 +229,7 @@ class FinalApproach:
     @cached_property
     def gerp_m(self) -> FloatArray:
         """Elevation reference point in the approach frame, shape (3,) [m]."""
-        return self.gpip_m + np.array([0.0, self.gerp_offset_m, 0.0])
+        return np.array([self.gpip_m[0], self.gerp_offset_m, 0.0])
 
     def approach_from_ecef(self, position_ecef_m: ArrayLike) -> FloatArray:
         """Positions (..., 3) in the approach frame [m] of ECEF positions (..., 3) [m]."""
@@ -244,7 +244,8 @@ class FinalApproach:
 
     def path_height_m(self, distance_m: ArrayLike) -> FloatArray:
         """Height of the path above the LTP's tangent plane at a distance to the LTP [m]."""
-        return self.tch_m + np.asarray(distance_m, dtype=np.float64) * np.tan(self.gpa_rad)
+        result: FloatArray = self.tch_m + np.asarray(distance_m, dtype=np.float64) * np.tan(self.gpa_rad)
+        return result
 
     def position_on_path(self, distance_m: ArrayLike) -> FloatArray:
         """ECEF positions (..., 3) of the points of the path at distances (...) to the LTP [m]."""

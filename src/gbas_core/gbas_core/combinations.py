@@ -1,8 +1,8 @@
 """Linear combinations of two bands.
 
-Model: ``rho_i = r + I_i + ...`` and ``phi_i = r - I_i + ...`` with ``I_j / I_i = (f_i / f_j)^2``, all in metres. The band
-arguments are indices into :data:`gbas_core.signals.BANDS`. Frequencies are whole multiples of 10.23 MHz, so the ratios
-are exact. Any combination with a missing part is missing.
+Model: ``rho_i = r + I_i + ...`` and ``phi_i = r - I_i + ...`` with ``I_j / I_i = (f_i / f_j)^2``, all in metres. The
+band arguments are indices into :data:`gbas_core.signals.BANDS`. Frequencies are whole multiples of 10.23 MHz, so the
+ratios are exact. Any combination with a missing part is missing.
 
 Source: Jiang, Milner, Macabiau, ENC 2015, eq (8) to (11); Hwang, McGraw, Bader, Navigation 46(2), 1999 (divergence-free
 smoothing).
@@ -93,7 +93,8 @@ def slant_iono_from_carriers(carrier_m: FloatArray, other_m: FloatArray, band: i
 def divergence_free_carrier(carrier_m: FloatArray, other_m: FloatArray, band: int, other: int) -> FloatArray:
     """Carrier of `band` with the ionosphere of its code, ``phi + 2 / (gamma - 1) (phi - phi_other)``.
 
-    Smoothing the code of `band` with it leaves the code's ionospheric delay and no divergence, whatever the time constant.
+    Smoothing the code of `band` with it leaves the code's ionospheric delay and no divergence, whatever the time
+    constant.
 
     Parameters
     ----------
@@ -143,8 +144,8 @@ def ionosphere_free_cmc(
 def combination_matrix(band: int, other: int) -> FloatArray:
     """The four statistics of the ENC 2015 paper as rows over ``(rho, rho_other, phi, phi_other)``.
 
-    Rows: divergence-free code minus carrier of `band` and of `other`, ionosphere-free code minus carrier, ionosphere-free
-    carrier.
+    Rows: divergence-free code minus carrier of `band` and of `other`, ionosphere-free code minus carrier,
+    ionosphere-free carrier.
 
     Returns
     -------
@@ -153,8 +154,8 @@ def combination_matrix(band: int, other: int) -> FloatArray:
 
     Notes
     -----
-    The matrix has rank 3: the third row is ``gamma/(gamma-1)`` times the first minus ``1/(gamma-1)`` times the second. The
-    paper rounds the coefficients (3.53 for 3.5212), which hides that.
+    The matrix has rank 3: the third row is ``gamma/(gamma-1)`` times the first minus ``1/(gamma-1)`` times the
+    second. The paper rounds the coefficients (3.53 for 3.5212), which hides that.
 
     Source: ENC 2015, eq (8) to (11) and (17).
     """

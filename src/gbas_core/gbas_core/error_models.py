@@ -61,7 +61,8 @@ AAD_A: Final = AirborneCurve(a0_m=0.15, a1_m=0.43, theta0_deg=6.9)
 AAD_B: Final = AirborneCurve(a0_m=0.11, a1_m=0.13, theta0_deg=4.0)
 AIRFRAME_MULTIPATH: Final = AirborneCurve(a0_m=0.13, a1_m=0.53, theta0_deg=10.0)
 
-# Uncertain, ours: surrogates for L5/E5a and E1, whose curves are published as pictures only. Replace when numbers are known.
+# Uncertain, ours: surrogates for L5/E5a and E1, whose curves are published as pictures only. Replace when numbers are
+# known.
 L5_GROUND_SURROGATE: Final = GroundCurve(a0_m=0.08, a1_m=0.30, theta0_deg=15.5, a2_m=0.04)
 L5_NOISE_SURROGATE: Final = AirborneCurve(a0_m=0.06, a1_m=0.05, theta0_deg=6.0)
 L5_MULTIPATH_SURROGATE: Final = AirborneCurve(a0_m=0.08, a1_m=0.20, theta0_deg=10.0)
@@ -251,7 +252,8 @@ def sigma_iono_m(
     speed_mps : array_like
         Horizontal speed of the aircraft, v_air [m/s].
     tau_s : array_like
-        Smoothing time constant [s]; 100 s for GAST C and for the protection levels of GAST D (uncertain for its weights).
+        Smoothing time constant [s]; 100 s for GAST C and for the protection levels of GAST D (uncertain for its
+        weights).
 
     Returns
     -------

@@ -12,11 +12,11 @@ filter starts anyway). The tests:
 - **geometry-free**: change of the difference of two carriers, L1-L5 and, where there is no L5, L1-L2.
 
 The Doppler and rate tests first remove what all satellites of a receiver have in common: its clock. A step of the clock
-that moves code and carrier together (some receivers step by a millisecond) is therefore no slip; a step of the code alone
-is caught by the code test on every satellite, as it must be.
+that moves code and carrier together (some receivers step by a millisecond) is therefore no slip; a step of the code
+alone is caught by the code test on every satellite, as it must be.
 
-Arrays are (R, N_BANDS, N_SATS). Source: Annex 10 leaves slip detection to the manufacturer; the tests are the usual ones
-(Kaplan and Hegarty, Understanding GPS/GNSS, 3rd ed., ch. 12; Blewitt, GRL 17(3), 1990 for the geometry-free one).
+Arrays are (R, N_BANDS, N_SATS). Source: Annex 10 leaves slip detection to the manufacturer; the tests are the usual
+ones (Kaplan and Hegarty, Understanding GPS/GNSS, 3rd ed., ch. 12; Blewitt, GRL 17(3), 1990 for the geometry-free one).
 """
 
 from __future__ import annotations
@@ -71,8 +71,8 @@ class SlipParams:
     receiver_jerk_mps3 : float
         Jerk of the receiver; 0 on the ground [m/s^3].
     geometry_free_base_m, geometry_free_rate_mps, geometry_free_acceleration_mps2 : float
-        Geometry-free test, ``base + acceleration T^2`` against the last change, or ``base + rate T`` where there is none:
-        noise, rate of the ionosphere in a storm, change of that rate [m, m/s, m/s^2].
+        Geometry-free test, ``base + acceleration T^2`` against the last change, or ``base + rate T`` where there is
+        none: noise, rate of the ionosphere in a storm, change of that rate [m, m/s, m/s^2].
     min_satellites : int
         Satellites needed to tell the receiver's clock from slips; with fewer the rate test is not made.
     """
@@ -190,10 +190,7 @@ def slip_step(
     state : SlipState
     result : SlipResult
     """
-    if range_m is None:
-        known_m = np.full((len(code_m), 1, code_m.shape[-1]), np.nan)
-    else:
-        known_m = range_m[:, np.newaxis, :]
+    known_m = np.full((len(code_m), 1, code_m.shape[-1]), np.nan) if range_m is None else range_m[:, np.newaxis, :]
     cause = _lock_lost(lli)
     change_m = carrier_m - state.carrier_m
     if not 0.0 < dt_s <= params.max_gap_s:
@@ -263,7 +260,7 @@ def _tests(
 
 
 def _common(residual_m: FloatArray, min_satellites: int) -> tuple[FloatArray, BoolArray]:
-    """Median over satellites and bands (R, 1, 1), and whether there were enough satellites; without, the median is 0."""
+    """Median over satellites and bands (R, 1, 1), 0 if there are too few satellites, and whether there are enough."""
     present = np.isfinite(residual_m)
     enough = np.count_nonzero(present.any(axis=1), axis=-1) >= max(min_satellites, 1)
     ordered = np.sort(np.where(present, residual_m, np.inf).reshape(len(residual_m), -1), axis=-1)

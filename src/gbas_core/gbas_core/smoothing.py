@@ -1,8 +1,8 @@
 """Carrier smoothing of code ranges: the Hatch filter both ends of a GBAS run.
 
-The filter is ``P_n = w R_n + (1 - w) (P_{n-1} + phi_n - phi_{n-1})`` with ``w = T / tau``. While it fills, the *variable*
-start uses ``w = max(1/n, T/tau)``, n being the number of epochs since the (re)start; the *invariant* start uses ``T / tau``
-from the first epoch on.
+The filter is ``P_n = w R_n + (1 - w) (P_{n-1} + phi_n - phi_{n-1})`` with ``w = T / tau``. While it fills, the
+*variable* start uses ``w = max(1/n, T/tau)``, n being the number of epochs since the (re)start; the *invariant* start
+uses ``T/tau`` from the first epoch on.
 
 Arrays are (..., N_SATS): usually (receivers, bands, satellites). One state carries several time constants at once: its
 smoothed range has the time constants as its first axis, and everything that does not depend on the time constant (last
@@ -39,8 +39,8 @@ class SmoothingParams:
     tau_s : tuple of float
         Time constants; each is one entry of the leading axis of the smoothed range [s].
     start : {"variable", "invariant"}
-        Weight while the filter fills: ``max(1/n, T/tau)`` or ``T/tau``. Annex 10 asks for convergence after a restart that
-        only the variable start meets; the other is the alternative the ENC 2015 paper studies.
+        Weight while the filter fills: ``max(1/n, T/tau)`` or ``T/tau``. Annex 10 asks for convergence after a restart
+        that only the variable start meets; the other is the alternative the ENC 2015 paper studies.
     max_gap_s : float
         A longer interval between two epochs restarts every filter [s]. Uncertain, ours: it must be above the data's
         interval (0.5 s or 1 s), so raise it for 30 s data.
@@ -126,8 +126,8 @@ def smooth_step(
     """Advance every filter by one epoch.
 
     A filter restarts with the raw code where `slipped` says so and where it was empty; all restart when `dt_s` is not
-    finite, not positive or above ``params.max_gap_s`` (so NaN does for the first epoch). A satellite without finite code
-    and carrier is cleared and gives NaN: it restarts when it comes back.
+    finite, not positive or above ``params.max_gap_s`` (so NaN does for the first epoch). A satellite without finite
+    code and carrier is cleared and gives NaN: it restarts when it comes back.
 
     Parameters
     ----------

@@ -1,9 +1,9 @@
 """Weighted least squares: from ranges to position, and the projection matrix protection levels are made of.
 
 The design row of satellite i is ``[-e_x, -e_y, -e_z, clock...]``, e being the unit vector from the receiver to the
-satellite, in whatever frame e is given: the approach frame (x forward, y left, z up) for guidance and protection levels,
-ECEF for a first position. Each clock group (a constellation) has one clock unknown; a group without a used satellite is
-dropped, and its row of S is zero.
+satellite, in whatever frame e is given: the approach frame (x forward, y left, z up) for guidance and protection
+levels, ECEF for a first position. Each clock group (a constellation) has one clock unknown; a group without a used
+satellite is dropped, and its row of S is zero.
 
 Nothing here repairs a weak geometry: too few satellites, or a condition number above the bound, gives None, which the
 caller must handle.
