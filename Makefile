@@ -1,0 +1,54 @@
+# Everything runs in .venv, which is made on first use; no virtual environment need be active.
+# PYTHONPATH and AMENT_PREFIX_PATH of a sourced ROS installation are kept out.
+SHELL := /bin/bash
+VENV := .venv
+READY := $(VENV)/.ready
+RUN := env -u PYTHONPATH -u PYTHONHOME AMENT_PREFIX_PATH=$(CURDIR)/$(VENV) PATH="$(CURDIR)/$(VENV)/bin:$$PATH"
+ARGS ?=
+
+ifndef GBAS_DATA
+ifneq ($(wildcard ../shared/data),)
+export GBAS_DATA := $(abspath ../shared/data)
+endif
+endif
+
+.PHONY: help setup demo test campaign lint build packages clean lock
+.DEFAULT_GOAL := help
+
+help:  ## what can be made
+	@sed -n 's/^\([a-z]*\):.*## /  make \1|/p' $(MAKEFILE_LIST) | column -t -s '|'
+
+$(READY): constraints.txt scripts/setup.sh $(wildcard src/*/setup.py)
+	@scripts/setup.sh $(VENV)
+	@touch $@
+
+setup: $(READY)  ## make .venv with the suite and everything it needs
+
+demo: $(READY)  ## fly one approach, write a bag and a report, print where they are
+	@$(RUN) gbas demo $(ARGS)
+
+test: $(READY)  ## run every test but the campaigns (ARGS="-k name" to choose)
+	@$(RUN) python -m pytest $(ARGS)
+
+campaign: $(READY)  ## run the long tests
+	@$(RUN) python -m pytest -m campaign $(ARGS)
+
+lint: $(READY)  ## ruff, and mypy --strict on the pure modules
+	@$(RUN) ruff check .
+	@$(RUN) mypy
+
+build: $(READY)  ## colcon build of the ROS 2 workspace
+	@cd ros2_ws && $(RUN) COLCON_DEFAULTS_FILE=colcon_defaults.yaml colcon build
+
+packages: $(READY)  ## list the packages as colcon sees them
+	@cd ros2_ws && $(RUN) COLCON_DEFAULTS_FILE=colcon_defaults.yaml colcon list
+
+clean:  ## remove .venv and all that was built
+	rm -rf $(VENV) ros2_ws/build ros2_ws/install ros2_ws/log src/*/build src/*/*.egg-info
+	rm -rf .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+lock: $(READY)  ## pin requirements.txt and all it needs in constraints.txt
+	@head -2 constraints.txt > $(VENV)/constraints.new
+	@$(VENV)/bin/uv pip compile -q --system-certs --no-annotate --no-header --python-version 3.11 requirements.txt >> $(VENV)/constraints.new
+	@mv $(VENV)/constraints.new constraints.txt

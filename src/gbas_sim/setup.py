@@ -1,0 +1,22 @@
+from setuptools import find_packages, setup
+
+PACKAGE = "gbas_sim"
+
+setup(
+    name=PACKAGE,
+    version="0.1.0",
+    description="The simulated truth: constellations, receivers and flight.",
+    license="Apache-2.0",
+    maintainer="GBAS suite developers",
+    maintainer_email="dev@example.org",
+    python_requires=">=3.11",
+    packages=find_packages(include=[PACKAGE, f"{PACKAGE}.*"]),
+    package_data={PACKAGE: ["py.typed"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
+        (f"share/{PACKAGE}", ["package.xml"]),
+    ],
+    install_requires=["gbas_core", "gbas_msgs_py", "numpy"],
+    zip_safe=True,
+    entry_points={"console_scripts": ["simulator = gbas_sim.nodes.simulator:main"]},
+)
