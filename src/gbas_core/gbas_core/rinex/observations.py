@@ -1,0 +1,418 @@
+"""Observation files."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import sidereon
+from numpy.typing import NDArray
+
+from gbas_core.gpstime import MILLISECONDS_PER_WEEK, calendar_text, epoch_key, from_epoch_key, gps_from_calendar
+from gbas_core.observations import ObservationEpoch
+from gbas_core.record import FloatArray
+from gbas_core.rinex.text import PathLike, RinexError, checked_version, parser_problem, read_text
+from gbas_core.satellites import N_SATS, SAT_INDEX
+from gbas_core.signals import BAND_INDEX, BANDS, N_BANDS, WAVELENGTH_M
+
+IntArray = NDArray[np.int64]
+SignalTable = Mapping[tuple[str, str], Sequence[str]]
+
+DEFAULT_SIGNALS: Final[SignalTable] = {
+    ("G", "L1"): ("1C", "1W", "1P"),
+    ("G", "L2"): ("2W", "2L", "2S", "2X", "2C", "2P"),
+    ("G", "L5"): ("5Q", "5I", "5X"),
+    ("E", "L1"): ("1C", "1B", "1X"),
+    ("E", "L5"): ("5Q", "5I", "5X"),
+}
+"""Tracking codes (RINEX 3 band and attribute) by system and band, the preferred first."""
+
+_CODE, _CARRIER, _DOPPLER, _CN0, _LLI = range(5)
+_QUANTITY_LETTERS: Final = "CLDS"
+_GPS_SCALES: Final = ("GPST", "GST")  # Galileo time equals GPS time within tens of nanoseconds
+_TAG_TOLERANCE_S: Final = 1e-6
+_OBSERVED_FLAGS: Final = (0, 1)
+_POWER_FAILURE_FLAG: Final = 1
+_CYCLE_SLIP_FLAG: Final = 6
+# Epoch lines: RINEX 2.11 table A2 (1X,I2.2,4(1X,I2),F11.7,2X,I1,I3); RINEX 3 and 4 begin theirs with ">".
+_EPOCH_LINE_2: Final = re.compile(r"^ [ \d]\d [ \d]\d [ \d]\d [ \d]\d [ \d]\d [ \d]\d\.\d{7}  \d[ \d]{3}", re.MULTILINE)
+_EPOCH_LINE_3: Final = re.compile(r"^>", re.MULTILINE)
+_CRINEX_LABEL: Final = "CRINEX VERS   / TYPE"
+_MAX_CRINEX_LINES_PER_EPOCH: Final = 200
+
+
+@dataclass(frozen=True, kw_only=True)
+class SignalChoice:
+    """The observation codes taken for one system and band; None where the file has none."""
+
+    code: str | None
+    carrier: str | None
+    doppler: str | None
+    cn0: str | None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ObservationFile:
+    """All observations of one file. Arrays are not writable; E epochs, strictly increasing.
+
+    Attributes
+    ----------
+    path : Path
+    marker : str
+        Marker name, or the file's name where the header has none.
+    approx_position_m : (3,) array or None
+        Header's approximate position of the marker, ECEF [m].
+    antenna_delta_hen_m : (3,) array or None
+        Antenna reference point above the marker: height, east, north [m].
+    interval_s : float or None
+        Header's interval, else the median spacing of the epochs, else (a single epoch) None [s].
+    gps_week : (E,) int array
+    tow_s : (E,) array
+        Receiver's time tags in GPS time, rounded to the millisecond [s].
+    code_m, carrier_m, doppler_hz, cn0_dbhz, lli : (E, N_BANDS, N_SATS) arrays
+        As in :class:`~gbas_core.observations.ObservationEpoch`.
+    signals : mapping from (system, band) to SignalChoice
+        What the columns hold.
+    simulated : bool
+    notes : tuple of str
+        What was left out or repaired.
+    """
+
+    path: Path
+    marker: str
+    approx_position_m: FloatArray | None
+    antenna_delta_hen_m: FloatArray | None
+    interval_s: float | None
+    gps_week: IntArray
+    tow_s: FloatArray
+    code_m: FloatArray
+    carrier_m: FloatArray
+    doppler_hz: FloatArray
+    cn0_dbhz: FloatArray
+    lli: FloatArray
+    signals: Mapping[tuple[str, str], SignalChoice]
+    simulated: bool
+    notes: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.tow_s)
+
+    @property
+    def first(self) -> tuple[int, float]:
+        """GPS week and time of week [s] of the first epoch."""
+        return int(self.gps_week[0]), float(self.tow_s[0])
+
+    @property
+    def last(self) -> tuple[int, float]:
+        """GPS week and time of week [s] of the last epoch."""
+        return int(self.gps_week[-1]), float(self.tow_s[-1])
+
+    @property
+    def keys(self) -> IntArray:
+        """Epoch keys ``(E,)``, see :func:`gbas_core.gpstime.epoch_key`."""
+        return self.gps_week * MILLISECONDS_PER_WEEK + np.rint(self.tow_s * 1000.0).astype(np.int64)
+
+    def describe(self) -> str:
+        """One line: the file, the receiver and the time it covers."""
+        return f"observations {self.path} ({self.marker}) cover {_text(self.first)} to {_text(self.last)}"
+
+    def epoch(self, index: int) -> ObservationEpoch:
+        """The observations of one epoch."""
+        return ObservationEpoch(
+            gps_week=int(self.gps_week[index]),
+            tow_s=float(self.tow_s[index]),
+            simulated=float(self.simulated),
+            code_m=self.code_m[index],
+            carrier_m=self.carrier_m[index],
+            doppler_hz=self.doppler_hz[index],
+            cn0_dbhz=self.cn0_dbhz[index],
+            lli=self.lli[index],
+        )
+
+
+def read_observations(
+    path: PathLike, *, signals: SignalTable = DEFAULT_SIGNALS, simulated: bool = False
+) -> ObservationFile:
+    """Read an observation file.
+
+    Parameters
+    ----------
+    path : str or Path
+        RINEX 2, 3 or 4 or CRINEX; plain or gzip.
+    signals : mapping from (system, band) to tracking codes
+        Preference per system ("G", "E") and band, see :data:`DEFAULT_SIGNALS`. For the whole file one tracking code is
+        taken per system and band: the first that has code and carrier, and at least half as many observations as the
+        best of the listed ones. If none has both, code and carrier come from the first that has each.
+    simulated : bool
+        Marks the observations as made by a simulator.
+
+    Returns
+    -------
+    ObservationFile
+
+    Raises
+    ------
+    RinexError
+        For anything but a RINEX observation file in GPS or Galileo time with at least one epoch.
+    ValueError
+        For an unknown system or band in `signals`.
+
+    Notes
+    -----
+    Event records (flags 2 to 5) are skipped. A power failure (flag 1) and cycle slip records (flag 6) set bit 0 of
+    `lli` on all channels concerned. Zero means missing, as RINEX says. C/N0 is NaN where the file does not say that
+    its signal strengths are in dB-Hz (RINEX 2 without SIGNAL STRENGTH UNIT: the unit is the receiver's own).
+    An incomplete last epoch is left out.
+    """
+    path = Path(path)
+    notes: list[str] = []
+    version, parsed = _parsed(path, notes)
+    header = parsed.header
+    _check_time_scale(path, header)
+    epochs = _Epochs.of(path, parsed.epochs, notes)
+    chosen, arrays = _dense(_flat_values(parsed, epochs, signals), len(epochs.keys), signals)
+    _set_loss_of_lock(arrays[_LLI], arrays[_CARRIER], epochs)
+    if header.signal_strength_unit != "DBHZ" and version < 3.0 and np.isfinite(arrays[_CN0]).any():
+        notes.append("signal strengths are in the receiver's own unit (no SIGNAL STRENGTH UNIT DBHZ) and left out")
+        arrays[_CN0][:] = np.nan
+    _note_early_end(header, epochs.keys, notes)
+    week, milliseconds = np.divmod(epochs.keys, MILLISECONDS_PER_WEEK)
+    tow_s = milliseconds / 1000.0
+    for array in (*arrays, week, tow_s):
+        array.flags.writeable = False
+    approx_position_m = _vector(header.approx_position_m)
+    return ObservationFile(
+        path=path,
+        marker=header.marker_name or path.name,
+        approx_position_m=approx_position_m if approx_position_m is not None and approx_position_m.any() else None,
+        antenna_delta_hen_m=_vector(header.antenna_delta_hen_m),
+        interval_s=header.interval_s or _median_spacing_s(epochs.keys),
+        gps_week=week,
+        tow_s=tow_s,
+        code_m=arrays[_CODE],
+        carrier_m=arrays[_CARRIER],
+        doppler_hz=arrays[_DOPPLER],
+        cn0_dbhz=arrays[_CN0],
+        lli=arrays[_LLI],
+        signals=chosen,
+        simulated=simulated,
+        notes=tuple(notes),
+    )
+
+
+def _parsed(path: Path, notes: list[str]) -> tuple[float, Any]:
+    """RINEX version and the parser's file; without the last epoch if that is what stops the parser."""
+    text = read_text(path, notes)
+    if text[60:80].rstrip() == _CRINEX_LABEL:
+        text = _decoded_crinex(path, text, notes)
+    version = checked_version(path, text, "O", "a RINEX observation file")
+    try:
+        parsed = sidereon.parse_rinex_obs(text)
+    except sidereon.ParseError as error:
+        starts = [match.start() for match in (_EPOCH_LINE_2 if version < 3.0 else _EPOCH_LINE_3).finditer(text)]
+        try:
+            parsed = sidereon.parse_rinex_obs(text[: starts[-1] if starts else 0])
+        except sidereon.ParseError:
+            raise RinexError(path, parser_problem(text, error)) from error
+        notes.append(f"the last epoch is incomplete and was left out ({parser_problem(text, error)})")
+    if parsed.skipped_records:
+        notes.append(f"{parsed.skipped_records} records were not understood and left out")
+    return version, parsed
+
+
+def _decoded_crinex(path: Path, text: str, notes: list[str]) -> str:
+    """RINEX text of a CRINEX file; a cut one is decoded up to its last whole epoch."""
+    try:
+        return sidereon.decode_crinex(text)
+    except sidereon.ParseError as error:
+        first_error = error
+    lines = text.splitlines(keepends=True)
+    for dropped in range(1, min(_MAX_CRINEX_LINES_PER_EPOCH, len(lines))):
+        try:
+            decoded = sidereon.decode_crinex("".join(lines[:-dropped]))
+        except sidereon.ParseError:
+            continue
+        notes.append("the last epoch is incomplete and was left out")
+        return decoded
+    raise RinexError(path, parser_problem(text, first_error)) from first_error
+
+
+def _check_time_scale(path: Path, header: Any) -> None:
+    first = header.time_of_first_obs
+    if first is None:
+        raise RinexError(path, "the header has no TIME OF FIRST OBS; expected one, since it names the time scale")
+    scale = first[1].abbrev
+    if scale not in _GPS_SCALES:
+        raise RinexError(path, f"TIME OF FIRST OBS: time scale {scale}; expected GPS or Galileo time")
+
+
+def _seconds(calendar: Any) -> tuple[int, float]:
+    return gps_from_calendar(
+        calendar.year, calendar.month, calendar.day, calendar.hour, calendar.minute, calendar.second
+    )
+
+
+def _text(time: tuple[int, float]) -> str:
+    return calendar_text(*time)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Epochs:
+    """The observation epochs of a file: where the parser has them, their keys, and where lock was lost."""
+
+    indices: list[int]
+    keys: IntArray
+    power_failures: list[int]
+    slips: list[tuple[int, int]]  # (epoch, satellite)
+
+    @staticmethod
+    def of(path: Path, parsed_epochs: Sequence[Any], notes: list[str]) -> _Epochs:
+        indices: list[int] = []
+        keys: list[int] = []
+        power: list[int] = []
+        slips: list[tuple[int, str]] = []  # (key, satellite)
+        largest_rounding_s, unordered = 0.0, 0
+        for index, item in enumerate(parsed_epochs):
+            if item.epoch is None:
+                continue
+            week, tow_s = _seconds(item.epoch)
+            key = epoch_key(week, tow_s)
+            if item.flag == _CYCLE_SLIP_FLAG:
+                slips += [(key, satellite) for satellite in item.cycle_slip_satellites]
+            if item.flag not in _OBSERVED_FLAGS:
+                continue
+            if keys and key <= keys[-1]:
+                unordered += 1
+                continue
+            largest_rounding_s = max(largest_rounding_s, abs(tow_s - from_epoch_key(key)[1]))
+            if item.flag == _POWER_FAILURE_FLAG:
+                power.append(len(keys))
+            indices.append(index)
+            keys.append(key)
+        if not keys:
+            raise RinexError(path, "has no observation epoch; expected at least one")
+        if unordered:
+            notes.append(f"{unordered} epochs are not later than the one before and were left out")
+        if largest_rounding_s > _TAG_TOLERANCE_S:
+            notes.append(f"time tags were rounded to the millisecond, by up to {1e6 * largest_rounding_s:.0f} us")
+        return _Epochs(
+            indices=indices,
+            keys=np.array(keys, dtype=np.int64),
+            power_failures=power,
+            slips=[
+                (int(np.searchsorted(keys, key)), SAT_INDEX[satellite])
+                for key, satellite in slips
+                if satellite in SAT_INDEX and key <= keys[-1]
+            ],
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _FlatValues:
+    """Every wanted observation of a file, one row each; `code` indexes `codes`."""
+
+    codes: list[tuple[str, str]]  # (system, observation code)
+    epoch: IntArray
+    satellite: IntArray
+    code: IntArray
+    value: FloatArray
+    lli: FloatArray
+
+
+def _flat_values(parsed: Any, epochs: _Epochs, signals: SignalTable) -> _FlatValues:
+    wanted: dict[str, list[str]] = {"G": [], "E": []}
+    for (system, band), trackings in signals.items():
+        if system not in wanted or band not in BAND_INDEX:
+            raise ValueError(f"signals: {(system, band)!r} is not a system (G, E) and band ({', '.join(BANDS)})")
+        wanted[system] += [letter + tracking for tracking in trackings for letter in _QUANTITY_LETTERS]
+    codes = [(system, code) for system, names in wanted.items() for code in names]
+    place = {key: index for index, key in enumerate(codes)}
+    systems: dict[str, Any] = {"G": sidereon.GnssSystem.GPS, "E": sidereon.GnssSystem.GALILEO}
+    allowed = sidereon.ObservationFilter([(systems[letter], names) for letter, names in wanted.items() if names])
+    columns: list[tuple[Any, ...]] = []
+    for row, index in enumerate(epochs.indices):
+        series = parsed.observation_values(index, allowed)
+        names = series.satellites
+        satellite = np.array([SAT_INDEX.get(name, -1) for name in names], dtype=np.int16)
+        keys = [place.get((name[0], code), -1) for name, code in zip(names, series.codes, strict=True)]
+        columns.append((np.full(len(names), row), satellite, np.array(keys, dtype=np.int16), series.values, series.lli))
+    epoch, satellites, code, value, lli = (np.concatenate(column) for column in zip(*columns, strict=True))
+    keep = (satellites >= 0) & (code >= 0) & np.isfinite(value) & (value != 0.0)
+    return _FlatValues(
+        codes=codes, epoch=epoch[keep], satellite=satellites[keep], code=code[keep], value=value[keep], lli=lli[keep]
+    )
+
+
+def _choose(counts: Mapping[str, int], trackings: Sequence[str]) -> SignalChoice | None:
+    """Choice for one system and band from the numbers of observations of each observation code."""
+    both = [min(counts.get("C" + tracking, 0), counts.get("L" + tracking, 0)) for tracking in trackings]
+    together = next((t for t, n in zip(trackings, both, strict=True) if n > 0 and 2 * n >= max(both)), None)
+
+    def first(letter: str, preferred: str | None) -> str | None:
+        order = [preferred, *trackings] if preferred else trackings
+        return next((letter + tracking for tracking in order if counts.get(letter + tracking)), None)
+
+    code, carrier = first("C", together), first("L", together)
+    if code is None and carrier is None:
+        return None
+    tracking = (carrier or code or "")[1:]
+    return SignalChoice(code=code, carrier=carrier, doppler=first("D", tracking), cn0=first("S", tracking))
+
+
+def _dense(
+    flat: _FlatValues, n_epochs: int, signals: SignalTable
+) -> tuple[dict[tuple[str, str], SignalChoice], list[FloatArray]]:
+    """Chosen signals and the five quantities (code, carrier, doppler, C/N0, LLI), each (E, N_BANDS, N_SATS)."""
+    number = dict(zip(flat.codes, np.bincount(flat.code, minlength=len(flat.codes)).tolist(), strict=True))
+    place = {key: index for index, key in enumerate(flat.codes)}
+    arrays = [np.full((n_epochs, N_BANDS, N_SATS), np.nan) for _ in range(5)]
+    chosen: dict[tuple[str, str], SignalChoice] = {}
+    for (system, band), trackings in signals.items():
+        choice = _choose({code: n for (letter, code), n in number.items() if letter == system}, trackings)
+        if choice is None:
+            continue
+        chosen[system, band] = choice
+        row = BAND_INDEX[band]
+        for quantity, name in enumerate((choice.code, choice.carrier, choice.doppler, choice.cn0)):
+            if name is None:
+                continue
+            rows = flat.code == place[system, name]
+            where = (flat.epoch[rows], row, flat.satellite[rows])
+            arrays[quantity][where] = flat.value[rows] * (WAVELENGTH_M[row] if quantity == _CARRIER else 1.0)
+            if quantity == _CARRIER:
+                arrays[_LLI][where] = np.nan_to_num(flat.lli[rows])  # a blank indicator is 0 (RINEX)
+    arrays[_CODE][arrays[_CODE] <= 0.0] = np.nan
+    return chosen, arrays
+
+
+def _set_loss_of_lock(lli: FloatArray, carrier_m: FloatArray, epochs: _Epochs) -> None:
+    for row in epochs.power_failures:
+        lli[row] = _with_bit_0(lli[row], carrier_m[row])
+    for row, satellite in epochs.slips:
+        lli[row, :, satellite] = _with_bit_0(lli[row, :, satellite], carrier_m[row, :, satellite])
+
+
+def _with_bit_0(lli: FloatArray, carrier_m: FloatArray) -> FloatArray:
+    set_bit = (np.nan_to_num(lli).astype(np.int64) | 1).astype(np.float64)
+    return np.where(np.isfinite(carrier_m), set_bit, lli)
+
+
+def _note_early_end(header: Any, keys: IntArray, notes: list[str]) -> None:
+    """Tell of a file that was cut between two epochs: its header says when it should end."""
+    if header.time_of_last_obs is None:
+        return
+    stated, last = epoch_key(*_seconds(header.time_of_last_obs[0])), int(keys[-1])
+    if stated > last:
+        notes.append(f"ends at {_text(from_epoch_key(last))}, its header says {_text(from_epoch_key(stated))}")
+
+
+def _vector(value: Any) -> FloatArray | None:
+    return None if value is None else np.asarray(value, dtype=np.float64)
+
+
+def _median_spacing_s(keys: IntArray) -> float | None:
+    return float(np.median(np.diff(keys))) / 1000.0 if len(keys) > 1 else None

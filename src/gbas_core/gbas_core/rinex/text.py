@@ -1,0 +1,103 @@
+"""The text of a RINEX file, and what is said when it is not one."""
+
+from __future__ import annotations
+
+import re
+import zlib
+from pathlib import Path
+from typing import Final
+
+PathLike = str | Path
+
+_QUOTED_LINE: Final = re.compile(r' in "(.*)', re.DOTALL)
+_GZIP_MAGIC: Final = b"\x1f\x8b"
+_COMPRESS_MAGIC: Final = b"\x1f\x9d"
+
+
+class RinexError(ValueError):
+    """A RINEX file that cannot be used; the text names the file, the place, what is there and what was expected."""
+
+    def __init__(self, path: PathLike, problem: str) -> None:
+        super().__init__(f"{path}: {problem}")
+        self.path = Path(path)
+        self.problem = problem
+
+
+def read_text(path: Path, notes: list[str]) -> str:
+    """Text of a file, one character a byte (RINEX is ASCII), whole lines only.
+
+    A last line without an end is left out: a number in it may be cut, and would still look like a number.
+
+    Raises
+    ------
+    RinexError
+        If the file cannot be read, is empty, or is compressed in a way that is not understood.
+    """
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise RinexError(path, f"cannot be read: {error.strerror}") from error
+    data = _decompressed(path, data, notes)
+    if not data.strip():
+        raise RinexError(path, "is empty; expected a RINEX file")
+    text = re.sub(rb"[^\x00-\x7f]", b"?", data).decode("ascii").replace("\r\n", "\n")
+    if not text.endswith("\n"):
+        notes.append("the last line has no end: it was taken for cut off and left out")
+        text = text[: text.rfind("\n") + 1] or text
+    return text
+
+
+def _decompressed(path: Path, data: bytes, notes: list[str]) -> bytes:
+    if data.startswith(_COMPRESS_MAGIC):
+        raise RinexError(path, "compressed with Unix compress (.Z); expected plain text or gzip")
+    if not data.startswith(_GZIP_MAGIC):
+        return data
+    text = bytearray()
+    while data.startswith(_GZIP_MAGIC):  # a gzip file may have several members
+        inflater = zlib.decompressobj(wbits=31)
+        try:
+            text += inflater.decompress(data) + inflater.flush()
+        except zlib.error as error:
+            raise RinexError(path, f"damaged gzip data after {len(text)} characters: {error}") from error
+        if not inflater.eof:
+            notes.append("the gzip data end early: the file was cut off")
+        data = inflater.unused_data
+    return bytes(text)
+
+
+def checked_version(path: Path, text: str, letter: str, expected: str) -> float:
+    """RINEX version of the first line, after checking that the file is of the expected type.
+
+    Parameters
+    ----------
+    letter : str
+        File type as in RINEX, "O" or "N".
+    expected : str
+        The same in words, for the error.
+
+    Raises
+    ------
+    RinexError
+        For a first line that is no RINEX header, another version than 2, 3 or 4, or another file type.
+    """
+    line = text.split("\n", 1)[0]
+    if line[60:80].rstrip() != "RINEX VERSION / TYPE":
+        raise RinexError(path, f"line 1: {line[:80]!r} is no RINEX header; expected {expected}")
+    try:
+        version = float(line[:20])
+    except ValueError:
+        raise RinexError(path, f"line 1: version {line[:20].strip()!r}; expected 2, 3 or 4") from None
+    if not 2.0 <= version < 5.0:
+        raise RinexError(path, f"line 1: version {version:g}; expected 2, 3 or 4")
+    if line[20:21].upper() != letter:
+        raise RinexError(path, f"line 1: file type {line[20:40].strip()!r}; expected {expected}")
+    return version
+
+
+def parser_problem(text: str, error: Exception) -> str:
+    """What the parser said, with the number of the line it quotes."""
+    message = str(error).removeprefix("parse error: ")
+    quoted = _QUOTED_LINE.search(message)
+    line = quoted.group(1).rstrip('"').split("\n")[0] if quoted else ""
+    at = text.find("\n" + line) if line.strip() else -1
+    return message if at < 0 else f"line {text.count(chr(10), 0, at) + 2}: {message}"
