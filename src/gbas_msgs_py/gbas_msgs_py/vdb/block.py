@@ -96,14 +96,24 @@ def encode_block(message: m.Message, station_id: str, *, test: bool = False) -> 
     FieldError
         Naming the field, value and bound.
     """
-    body = encode_body(message)
+    return wrap_body(message_type_of(message), encode_body(message), station_id, test=test)
+
+
+def wrap_body(message_type: int, body: bytes, station_id: str, *, test: bool = False) -> bytes:
+    """A message block of an encoded message: header before, CRC behind.
+
+    Raises
+    ------
+    FieldError
+        When the block is longer than a burst, or the station or type cannot be sent.
+    """
     length = HEADER_BYTES + len(body) + CRC_BYTES
     if length > MAX_BLOCK_BYTES:
-        raise FieldError(f"message type {message_type_of(message)} of {length} bytes; at most {MAX_BLOCK_BYTES} fit")
+        raise FieldError(f"message type {message_type} of {length} bytes; at most {MAX_BLOCK_BYTES} fit")
     header = BitWriter()
     header.put(MBI_TEST if test else MBI_NORMAL, 8)
     header.put(tables.STATION_ID.to_raw(station_id), tables.STATION_ID.bits)
-    header.put(tables.MESSAGE_TYPE.to_raw(message_type_of(message)), 8)
+    header.put(tables.MESSAGE_TYPE.to_raw(message_type), tables.MESSAGE_TYPE.bits)
     header.put(length, 8)
     data = header.to_bytes() + body
     return data + crc32q(data).to_bytes(CRC_BYTES, "little")
@@ -151,7 +161,7 @@ def _encode_data_set(data_set: m.FasDataSet | m.UnknownDataSet) -> bytes:
         return bytes((len(data_set.data) + 1,)) + data_set.data
     data = bytearray(_encoded(tables.FAS_DATA_SET, data_set))
     end = tables.FAS_BLOCK_BYTES
-    data[end : end + CRC_BYTES] = crc32q(data[:end]).to_bytes(CRC_BYTES, "little")
+    data[end : end + CRC_BYTES] = crc32q(bytes(data[:end])).to_bytes(CRC_BYTES, "little")
     return bytes((tables.FAS_DATA_SET_BYTES,)) + bytes(data)
 
 

@@ -20,8 +20,8 @@ class Burst:
     slot : int
         Slot in the frame, 0 (A) to 7 (H).
     bursts_in_frame : int
-        Bursts the station sends in this frame: lets a data-driven reader know when a frame is complete. Nothing else may
-        be concluded from it.
+        Bursts the station sends in this frame: lets a data-driven reader know when a frame is complete. Nothing else
+        may be concluded from it.
     payload : bytes
         Application data (message blocks back to back, at most 222 bytes) and the 6 bytes of application FEC.
     """

@@ -77,9 +77,9 @@ def correct_fec(payload: bytes) -> tuple[bytes, int]:
     if syndromes(payload) == 0:
         return payload[:n_data], 0
     fill = bytes(_DATA_BYTES - n_data)
-    codeword = payload[:n_data] + fill + payload[: n_data - 1 : -1]
+    codeword = payload[:n_data] + fill + payload[n_data:][::-1]
     try:
-        message, whole, places = _codec().decode(codeword)
+        message, _, places = _codec().decode(codeword)
     except reedsolo.ReedSolomonError as error:
         raise FecError(f"application FEC cannot repair the burst: {error}") from None
     if any(n_data <= place < _DATA_BYTES for place in places):
@@ -129,7 +129,8 @@ def _times_all_bytes(factors: NDArray[np.int64]) -> NDArray[np.int64]:
 def _packed(parts: NDArray[np.int64]) -> NDArray[np.uint64]:
     """(n, 256) integers of (n, 6, 256) bytes, the first in the lowest eight bits."""
     shifts = np.uint64(8) * np.arange(FEC_BYTES, dtype=np.uint64)
-    return np.bitwise_or.reduce(parts.astype(np.uint64) << shifts[:, None], axis=1)
+    packed: NDArray[np.uint64] = np.bitwise_or.reduce(parts.astype(np.uint64) << shifts[:, None], axis=1)
+    return packed
 
 
 @cache
@@ -146,7 +147,7 @@ def _parity_table() -> NDArray[np.uint64]:
     """(222, 256) packed FEC bytes of each byte value at each place of the application data.
 
     The generator matrix of the code, multiplied out: reedsolo's encoder is a Python loop over 249 times 6 products and
-    costs more than 300 microseconds a burst, this costs about 5. Rows come from reedsolo itself.
+    costs several hundred microseconds a burst on a small machine, this costs about 5. Rows come from reedsolo itself.
     """
     rows = np.zeros((MAX_APPLICATION_BYTES, FEC_BYTES), dtype=np.int64)
     for place in range(MAX_APPLICATION_BYTES):
@@ -170,9 +171,7 @@ TRAINING_MATRIX: Final[NDArray[np.uint8]] = np.array(
     ],
     dtype=np.uint8,
 )
-_TRAINING_COLUMNS: Final = [
-    tuple(column) for column in np.hstack([TRAINING_MATRIX, np.eye(5, dtype=np.uint8)]).T.tolist()
-]
+_TRAINING_COLUMNS: Final = [*map(tuple, TRAINING_MATRIX.T.tolist()), *map(tuple, np.eye(5, dtype=int).tolist())]
 
 
 def training_parity(bits: BitArray) -> BitArray:
