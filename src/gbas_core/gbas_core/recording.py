@@ -7,13 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gbas_core.ephemeris import Ephemeris
 from gbas_core.gpstime import calendar_text, from_epoch_key
 from gbas_core.observations import ObservationEpoch
-from gbas_core.rinex import IntArray, NavigationFile, ObservationFile, PathLike, read_navigation, read_observations
+from gbas_core.rinex import NavigationFile, ObservationFile, read_navigation, read_observations
 
 
 class RecordingError(ValueError):
@@ -60,11 +62,11 @@ class Recording:
     @classmethod
     def open(
         cls,
-        ground: Sequence[PathLike],
-        user: PathLike | None,
-        navigation: Sequence[PathLike],
+        ground: Sequence[str | Path],
+        user: str | Path | None,
+        navigation: Sequence[str | Path],
         *,
-        user_navigation: Sequence[PathLike] = (),
+        user_navigation: Sequence[str | Path] = (),
         galileo: str = "inav",
     ) -> Recording:
         """Read the files.
@@ -85,9 +87,18 @@ class Recording:
         return recording
 
     @property
-    def keys(self) -> IntArray:
+    def keys(self) -> NDArray[np.int64]:
         """Epochs of all files together, in order."""
         return np.asarray(np.unique(np.concatenate([file.keys for file in self._files()])))
+
+    @property
+    def overlap(self) -> tuple[int, int]:
+        """First and last epoch between which both a reference receiver and the user (if any) were observing."""
+        first = min(int(file.keys[0]) for file in self.ground)
+        last = max(int(file.keys[-1]) for file in self.ground)
+        if self.user is None:
+            return first, last
+        return max(first, int(self.user.keys[0])), min(last, int(self.user.keys[-1]))
 
     def epochs(self, *, first: int = 0, last: int | None = None) -> Iterator[RecordedEpoch]:
         """The epochs from key `first` to key `last`, both included, in order."""
