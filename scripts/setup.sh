@@ -28,7 +28,7 @@ find_python() {
         return
     fi
     for candidate in python3.12 python3.11 python3 /usr/bin/python3.12 /usr/bin/python3.11 /usr/bin/python3 \
-        "${HOME:-/root}"/.pyenv/versions/3.1[12].*/bin/python; do
+        "${HOME:-}"/.pyenv/versions/3.1[12].*/bin/python; do
         if usable "$candidate"; then
             echo "$candidate"
             return

@@ -1,0 +1,17 @@
+"""What all tests share: where the recorded data are."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+
+@pytest.fixture(scope="session")
+def data_dir() -> Path:
+    """Folder of the recorded data: GBAS_DATA, or shared/data beside the repository; tests without it are skipped."""
+    folder = Path(os.environ.get("GBAS_DATA") or Path(__file__).resolve().parents[2] / "shared" / "data")
+    if not folder.is_dir():
+        pytest.skip(f"no recorded data at {folder}; set GBAS_DATA")
+    return folder
