@@ -21,7 +21,7 @@ from gbas_core.frames import EARTH_RATE_RADPS, GM_GALILEO_M3PS2, GM_GPS_M3PS2, l
 from gbas_core.gpstime import SECONDS_PER_WEEK
 from gbas_core.record import FloatArray
 from gbas_core.satellites import IS_GPS
-from gbas_core.signals import IONO_RATIO, L1, SPEED_OF_LIGHT_MPS
+from gbas_core.signals import IONO_RATIO, L1, L2, SPEED_OF_LIGHT_MPS
 
 GM_M3PS2: Final[FloatArray] = np.where(IS_GPS, GM_GPS_M3PS2, GM_GALILEO_M3PS2)
 """Gravitational constant each system's ephemerides are made with, on the satellite axis."""
@@ -32,6 +32,10 @@ _SQRT_GM: Final[FloatArray] = np.sqrt(GM_M3PS2)
 # Newton from M + e sin M: four steps reach rounding for every eccentricity the messages can carry (below 0.5).
 _KEPLER_STEPS: Final = 4
 _MEAN_FLIGHT_S: Final = 0.077
+# As floats: comparing arrays with members of an enumeration is slow.
+_GPS_LNAV: Final = float(NavigationMessage.GPS_LNAV)
+_GALILEO_INAV: Final = float(NavigationMessage.GALILEO_INAV)
+_GALILEO_FNAV: Final = float(NavigationMessage.GALILEO_FNAV)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -71,24 +75,25 @@ def group_delay_s(ephemeris: Ephemeris, band: int | None = L1) -> FloatArray:
 
     Notes
     -----
-    GPS: TGD on L1, (f_L1/f)^2 TGD on L2 and L5. L5 would need the ISC of CNAV, which LNAV does not carry; what is
-    left (about 10 ns, the same for every user) is removed by differential corrections.
+    GPS: TGD on L1 and (f_L1/f_L2)^2 TGD on L2. The true delays of L2C and L5 need inter-signal corrections, which LNAV
+    does not carry; every user of the same ephemeris makes the same error, so differential corrections remove it. On L5
+    TGD is used, as if that correction were zero: on the satellites of 2026 this leaves 1.0 m rms, (f_L1/f_L5)^2 TGD
+    would leave 2.4 m.
     Galileo: an F/NAV clock refers to (E1, E5a), an I/NAV clock to (E1, E5b). E5a with an I/NAV clock takes both
     group delays: BGD(E1,E5b) + ((f_E1/f_E5a)^2 - 1) BGD(E1,E5a).
 
-    Source: IS-GPS-200N 20.3.3.3.3.2; Galileo OS SIS ICD 2.1, 5.1.5.
+    Source: IS-GPS-200N 20.3.3.3.3.2 and 30.3.3.3.1.1; Galileo OS SIS ICD 2.1, 5.1.5.
     """
     if band is None:
         return np.where(np.isfinite(ephemeris.af0_s), 0.0, np.nan)
+    first, e5b = ephemeris.group_delay_s, ephemeris.group_delay_e5b_s
     ratio = IONO_RATIO[band]
-    fnav_or_gps = ratio * ephemeris.group_delay_s
-    inav = (
-        ephemeris.group_delay_e5b_s + (ratio - 1.0) * ephemeris.group_delay_s
-        if band != L1
-        else ephemeris.group_delay_e5b_s
-    )
-    delay = np.where(ephemeris.message == NavigationMessage.GALILEO_INAV, inav, fnav_or_gps)
-    return np.where(np.isfinite(ephemeris.message), delay, np.nan)
+    fnav = ratio * first
+    inav = e5b if band == L1 else e5b + (ratio - 1.0) * first
+    gps = ratio * first if band == L2 else first
+    message = ephemeris.message
+    galileo = np.where(message == _GALILEO_INAV, inav, np.where(message == _GALILEO_FNAV, fnav, np.nan))
+    return np.where(message == _GPS_LNAV, gps, galileo)
 
 
 def _seconds_since(week: FloatArray, tow_s: FloatArray, gps_week: int, at_tow_s: ArrayLike) -> FloatArray:
