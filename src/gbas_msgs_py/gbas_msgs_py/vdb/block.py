@@ -21,7 +21,6 @@ MAX_BLOCK_BYTES: Final = 222
 MBI_NORMAL: Final = 0xAA
 MBI_TEST: Final = 0xFF
 
-_LAYOUTS: Final[dict[int, Layout]] = {1: tables.TYPE_1, 5: tables.TYPE_5, 11: tables.TYPE_11}
 _TYPE_NUMBERS: Final[dict[type, int]] = {
     m.Type1: 1,
     m.Type2: 2,
@@ -129,7 +128,7 @@ def encode_body(message: m.Message) -> bytes:
         return b"".join(_encode_data_set(data_set) for data_set in message.data_sets)
     if isinstance(message, m.UnknownMessage):
         return message.body
-    return _encoded(_LAYOUTS[message_type_of(message)], message)
+    return _encoded(tables.WHOLE_MESSAGES[message_type_of(message)], message)
 
 
 def _encoded(layout: Layout, record: Any) -> bytes:
@@ -227,9 +226,9 @@ def decode_body(message_type: int, body: bytes) -> tuple[m.Message, tuple[str, .
         return m.Type3(n_fill_bytes=len(body)), ()
     if message_type == 4:
         return _decode_type4(body)
-    if message_type not in _LAYOUTS:
+    if message_type not in tables.WHOLE_MESSAGES:
         return m.UnknownMessage(message_type=message_type, body=body), (f"message type {message_type} is not known",)
-    message: m.Message = decode(_LAYOUTS[message_type], reader)
+    message: m.Message = decode(tables.WHOLE_MESSAGES[message_type], reader)
     _refuse_rest(reader)
     return message, ()
 

@@ -138,8 +138,6 @@ GALILEO_INAV_FIELDS: Final = (*_GALILEO_ORBIT_FIELDS, _field("group_delay_e5b_s"
 def quantised(ephemeris: Ephemeris, fields: tuple[NavigationField, ...]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     """Counts of the fields of every satellite, as the satellite transmits them.
 
-    Angles are brought into the range of their field: a RINEX file may have added a whole turn.
-
     Returns
     -------
     counts : (n_fields, N_SATS) int array

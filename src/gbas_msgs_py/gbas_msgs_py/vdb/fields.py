@@ -25,6 +25,9 @@ from gbas_msgs_py.vdb.errors import FieldError, VdbError
 # A value that was computed from counts (0.02 * 3) must round up to the same counts: this part of one count is allowed.
 _ROUNDING_SLACK: Final = 1e-6
 
+# Nothing on the VDB is larger than this; beyond it arithmetic could overflow before the bounds are looked at.
+_LARGEST: Final = 1e15
+
 Rounding = Literal["nearest", "up", "down"]
 
 
@@ -109,6 +112,8 @@ class Number:
         """
         if value is None or value != value or value in (math.inf, -math.inf):
             return self._special(value)
+        if not -_LARGEST < value < _LARGEST:
+            raise self._out_of_bounds(value)
         numerator, denominator = self._ratio
         counts = (value - self.offset) * denominator / numerator
         if self.scale is None:

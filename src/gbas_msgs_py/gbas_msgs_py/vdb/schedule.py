@@ -401,7 +401,9 @@ def sources_that_fit(station: Type2, approaches: Sequence[FasDataSet | UnknownDa
         Frame(gps_week=0, tow_s=0.0, sources=(), station=station, approaches=tuple(approaches)), params
     )
     for n_sources in range(_MAX_SOURCES, -1, -1):
-        room = _room(_correction_lengths(_group_sizes(n_sources, params.gast_d, params.slots), params.gast_d), params.slots)
+        room = _room(
+            _correction_lengths(_group_sizes(n_sources, params.gast_d, params.slots), params.gast_d), params.slots
+        )
         if all(len(item.data) + (_WRAPPER_BYTES if item.is_data_set else 0) <= room for item in items):
             return n_sources
     raise ScheduleError(
@@ -421,7 +423,7 @@ def _correction_lengths(sizes: Sequence[int], gast_d: bool) -> list[int]:
 
 @lru_cache(maxsize=256)
 def _group_sizes(n_sources: int, gast_d: bool, slots: tuple[int, ...]) -> tuple[int, ...]:
-    """Satellites in each message of a linked pair: the division that leaves most room for another block in one burst."""
+    """Satellites in each message of a linked pair: the division that leaves most room in one burst."""
     if _places(n_sources) == 1:
         return (n_sources,)
     best, most_room = (-(-n_sources // 2), n_sources // 2), -1

@@ -400,10 +400,9 @@ TYPE_5: Final = Layout(
     ),
 )
 
-HEADER_BITS: Final = 48
-MESSAGE_BLOCK_IDENTIFIER: Final = Choice(
-    name="test", bits=8, values=(False, True), doc="0xAA normal, 0xFF test; see block.py"
-)
+# Messages that one table describes; types 2 and 4 have tails with lengths of their own.
+WHOLE_MESSAGES: Final[dict[int, Layout]] = {1: TYPE_1, 5: TYPE_5, 11: TYPE_11}
+
+# Of the header; the message block identifier and the length are in block.py.
 STATION_ID: Final = Text(name="station_id", characters=4, bits_per_character=6, doc="GBAS identification")
 MESSAGE_TYPE: Final = Number(name="message_type", bits=8)
-MESSAGE_LENGTH: Final = Number(name="message_length", bits=8, minimum=10, maximum=222, unit="bytes")
