@@ -7,36 +7,44 @@ filter starts anyway). The tests:
 - **gap**: the time since the last epoch is missing, not positive, or too long for a prediction.
 - **code**: carrier change against code change, a coarse net for large slips and for jumps of the code alone.
 - **Doppler**: carrier change against the integrated Doppler (trapezoid).
-- **rate**: carrier change against its own extrapolation, or against the change of the geometric range where the caller
-  knows it.
-- **geometry-free**: change of the difference of two carriers, L1-L5 and, where there is no L5, L1-L2.
+- **rate**: carrier change against its own extrapolation and, where the caller knows the geometric range, against it.
+- **geometry-free**: change of the difference of two carriers, L1-L5 and L1-L2.
 
-The Doppler and rate tests first remove what all satellites of a receiver have in common: its clock. A step of the clock
-that moves code and carrier together (some receivers step by a millisecond) is therefore no slip; a step of the code
-alone is caught by the code test on every satellite, as it must be.
+- **rate**: carrier change against its own extrapolation and, where the caller knows the geometric range, against this.
+clock, mostly by whole milliseconds. A step that moves code and carrier together is no slip. A step of the code alone is
+caught by the code test on every satellite, unless the caller asks for the carriers to follow the code. Either way the
+receiver samples at another instant than its time tag says from then on, and the predictions allow for that.
 
-Arrays are (R, N_BANDS, N_SATS). Source: Annex 10 leaves slip detection to the manufacturer; the tests are the usual
-ones (Kaplan and Hegarty, Understanding GPS/GNSS, 3rd ed., ch. 12; Blewitt, GRL 17(3), 1990 for the geometry-free one).
+Arrays are (R, N_BANDS, N_SATS).
+
+Source: the standards leave slip detection to the manufacturer; these tests are the usual ones (Kaplan and Hegarty,
+Understanding GPS/GNSS, 3rd ed., ch. 12; Blewitt, GRL 17(3), 1990, for the geometry-free one).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntFlag
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gbas_core.record import FloatArray
 from gbas_core.satellites import N_SATS
-from gbas_core.signals import L1, L2, L5, N_BANDS, WAVELENGTH_M
+from gbas_core.signals import L1, L2, L5, N_BANDS, SPEED_OF_LIGHT_MPS, WAVELENGTH_M
 
 BoolArray = NDArray[np.bool_]
-_LAMBDA_M: Final = WAVELENGTH_M[:, np.newaxis]
+CauseArray = NDArray[np.uint8]
 
-# Uncertain, ours: a smaller common step is put down to the clock's noise and not reported (0.5 microseconds).
+# Known: jerk of DO-229 normal manoeuvres, 0.25 g/s.
+NORMAL_MANOEUVRE_JERK_MPS3: Final = 0.25 * 9.80665
+# Uncertain, ours: a smaller common step is put down to the noise of the clock (0.5 microseconds).
 CLOCK_STEP_M: Final = 150.0
+
+_LAMBDA_M: Final = WAVELENGTH_M[:, np.newaxis]
+_MILLISECOND_M: Final = SPEED_OF_LIGHT_MPS * 1e-3
+_WHOLE_MILLISECONDS_M: Final = 15.0  # a code step this close to whole milliseconds is one
 
 
 class SlipCause(IntFlag):
@@ -52,7 +60,10 @@ class SlipCause(IntFlag):
 
 @dataclass(frozen=True, kw_only=True)
 class SlipParams:
-    """Thresholds of the slip tests. They grow with the interval T between epochs; all are ours, set on recorded data.
+    """Thresholds of the slip tests. They grow with the interval T between epochs.
+
+    All are uncertain (ours): set so that quiet 1 Hz recordings of five geodetic receivers give next to no false alarm,
+    and one cycle of L1 is found.
 
     Attributes
     ----------
@@ -69,36 +80,36 @@ class SlipParams:
     satellite_jerk_mps3 : float
         Change of a range acceleration by satellite motion, static receiver [m/s^3].
     receiver_jerk_mps3 : float
-        Jerk of the receiver; 0 on the ground [m/s^3].
+        Jerk of the receiver; 0 on the ground, for an aircraft see :data:`NORMAL_MANOEUVRE_JERK_MPS3` [m/s^3].
     geometry_free_base_m, geometry_free_rate_mps, geometry_free_acceleration_mps2 : float
         Geometry-free test, ``base + acceleration T^2`` against the last change, or ``base + rate T`` where there is
         none: noise, rate of the ionosphere in a storm, change of that rate [m, m/s, m/s^2].
     min_satellites : int
         Satellites needed to tell the receiver's clock from slips; with fewer the rate test is not made.
+    follow_code_steps : bool
+        Let carriers follow a step of all codes by whole milliseconds, instead of flagging all satellites. Who sets it
+        must smooth with ``SlipResult.carrier_m``.
     """
 
     max_gap_s: float = 35.0
     code_base_m: float = 10.0
     code_rate_mps: float = 0.3
     doppler_base_m: float = 0.05
-    doppler_noise_mps: float = 0.05
-    rate_base_m: float = 0.07
+    doppler_noise_mps: float = 0.10
+    rate_base_m: float = 0.10
     range_rate_mps: float = 0.05
-    satellite_jerk_mps3: float = 1e-4
+    satellite_jerk_mps3: float = 4e-5
     receiver_jerk_mps3: float = 0.0
-    geometry_free_base_m: float = 0.05
+    geometry_free_base_m: float = 0.06
     geometry_free_rate_mps: float = 0.07
-    geometry_free_acceleration_mps2: float = 1e-3
+    geometry_free_acceleration_mps2: float = 3e-4
     min_satellites: int = 3
+    follow_code_steps: bool = False
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
             if not (np.isfinite(value) and value >= 0):
                 raise ValueError(f"slips: {name} is {value}, it must be finite and not negative")
-
-
-# Known: jerk of DO-229 normal manoeuvres, 0.25 g/s.
-NORMAL_MANOEUVRE_JERK_MPS3: Final = 0.25 * 9.80665
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -108,11 +119,13 @@ class SlipState:
     Attributes
     ----------
     code_m, carrier_m, doppler_hz : (R, N_BANDS, N_SATS) arrays
-        Observations of the last epoch.
+        Observations of the last epoch, the carriers continued over followed code steps.
     rate_mps, acceleration_mps2 : (R, N_BANDS, N_SATS) arrays
-        Carrier rate over the last interval and its change since the one before, up to a term all satellites share.
+        Carrier rate over the last interval and its change since the one before, without clock steps.
     range_m : (R, 1, N_SATS) array
         Known ranges of the last epoch [m].
+    followed_m : (R,) array
+        Sum of the code steps the carriers followed [m].
     dt_s : float
         Length of the last interval [s].
     """
@@ -123,6 +136,7 @@ class SlipState:
     rate_mps: FloatArray
     acceleration_mps2: FloatArray
     range_m: FloatArray
+    followed_m: FloatArray
     dt_s: float
 
 
@@ -137,12 +151,26 @@ class SlipResult:
     cause : (R, N_BANDS, N_SATS) uint8 array
         :class:`SlipCause`, 0 where nothing was found.
     clock_step_m : (R,) array
-        Step of all carriers of a receiver that was taken for its clock, 0 if there was none [m].
+        Step of the receiver's clock as its codes show it, 0 if there was none [m].
+    carrier_m : (R, N_BANDS, N_SATS) array
+        The carriers, continued over the code steps they followed: the given ones unless ``follow_code_steps`` [m].
     """
 
     slipped: BoolArray
-    cause: NDArray[np.uint8]
+    cause: CauseArray
     clock_step_m: FloatArray
+    carrier_m: FloatArray
+
+
+class _Epoch(NamedTuple):
+    """Changes since the last epoch."""
+
+    carrier_m: FloatArray  # (R, N_BANDS, N_SATS)
+    code_m: FloatArray
+    doppler_mps: FloatArray  # mean rate over the interval from the Dopplers
+    range_m: FloatArray  # (R, 1, N_SATS)
+    predicted_mps: FloatArray  # carrier rate extrapolated to this interval
+    dt_s: FloatArray  # (R, 1, 1) true interval between the samples
 
 
 def initial_slips(n_receivers: int = 1) -> SlipState:
@@ -155,6 +183,7 @@ def initial_slips(n_receivers: int = 1) -> SlipState:
         rate_mps=nothing,
         acceleration_mps2=nothing,
         range_m=nothing[:, :1],
+        followed_m=np.zeros(n_receivers),
         dt_s=float("nan"),
     )
 
@@ -190,16 +219,22 @@ def slip_step(
     state : SlipState
     result : SlipResult
     """
-    known_m = np.full((len(code_m), 1, code_m.shape[-1]), np.nan) if range_m is None else range_m[:, np.newaxis, :]
-    cause = _lock_lost(lli)
-    change_m = carrier_m - state.carrier_m
-    if not 0.0 < dt_s <= params.max_gap_s:
-        cause |= _flag(np.isfinite(change_m), SlipCause.GAP)
-        rate_mps, step_m = np.full_like(carrier_m, np.nan), np.zeros(len(code_m))
+    known_m = np.full((len(code_m), 1, N_SATS), np.nan) if range_m is None else range_m[:, np.newaxis, :]
+    carrier_m = carrier_m + state.followed_m[:, np.newaxis, np.newaxis]
+    cause, followed_m, clock_step_m = _lock_lost(lli), state.followed_m, np.zeros(len(code_m))
+    if 0.0 < dt_s <= params.max_gap_s:
+        epoch = _changes(state, code_m, carrier_m, doppler_hz, known_m, dt_s)
+        epoch, clock_step_m = _clock_step(epoch, params)
+        if params.follow_code_steps and clock_step_m.any():
+            step_m = _steps_to_follow(epoch, clock_step_m, params)
+            followed_m, carrier_m = followed_m + step_m, carrier_m + step_m[:, np.newaxis, np.newaxis]
+            epoch = epoch._replace(carrier_m=carrier_m - state.carrier_m)
+        found, rate_mps = _tests(epoch, state, dt_s, params)
+        cause |= found
+        rate_mps = np.where(cause == 0, rate_mps, np.nan)
     else:
-        tests, step_m = _tests(state, change_m, code_m, doppler_hz, known_m, dt_s, params)
-        cause |= tests
-        rate_mps = np.where(cause == 0, (change_m - step_m[:, np.newaxis, np.newaxis]) / dt_s, np.nan)
+        cause |= _flag(np.isfinite(carrier_m - state.carrier_m), SlipCause.GAP)
+        rate_mps = np.full_like(carrier_m, np.nan)
     new = SlipState(
         code_m=code_m,
         carrier_m=carrier_m,
@@ -207,64 +242,93 @@ def slip_step(
         rate_mps=rate_mps,
         acceleration_mps2=(rate_mps - state.rate_mps) / (0.5 * (dt_s + state.dt_s)),
         range_m=known_m,
+        followed_m=followed_m,
         dt_s=dt_s,
     )
-    clock_step_m = np.where(np.abs(step_m) > CLOCK_STEP_M, step_m, 0.0)
-    return new, SlipResult(slipped=cause != 0, cause=cause, clock_step_m=clock_step_m)
+    return new, SlipResult(slipped=cause != 0, cause=cause, clock_step_m=clock_step_m, carrier_m=carrier_m)
 
 
-def _lock_lost(lli: FloatArray) -> NDArray[np.uint8]:
+def _lock_lost(lli: FloatArray) -> CauseArray:
     """Bit 0 of the indicator as a cause."""
     bits = np.where(np.isfinite(lli), lli, 0.0).astype(np.int64)
     return _flag(bits & 1 == 1, SlipCause.LOCK)
 
 
-def _flag(found: BoolArray, cause: SlipCause) -> NDArray[np.uint8]:
+def _flag(found: BoolArray, cause: SlipCause) -> CauseArray:
     return found.astype(np.uint8) * np.uint8(cause)
 
 
-def _tests(
+def _changes(
     state: SlipState,
-    change_m: FloatArray,
     code_m: FloatArray,
+    carrier_m: FloatArray,
     doppler_hz: FloatArray,
     known_m: FloatArray,
     dt_s: float,
-    params: SlipParams,
-) -> tuple[NDArray[np.uint8], FloatArray]:
-    """Causes found by comparison with the past, and the common step (R,) of the carriers [m]."""
+) -> _Epoch:
+    return _Epoch(
+        carrier_m=carrier_m - state.carrier_m,
+        code_m=code_m - state.code_m,
+        doppler_mps=-0.5 * _LAMBDA_M * (doppler_hz + state.doppler_hz),
+        range_m=known_m - state.range_m,
+        predicted_mps=state.rate_mps + state.acceleration_mps2 * (0.5 * (dt_s + state.dt_s)),
+        dt_s=np.full((len(code_m), 1, 1), dt_s),
+    )
+
+
+def _clock_step(epoch: _Epoch, params: SlipParams) -> tuple[_Epoch, FloatArray]:
+    """Common step of the codes (R,) [m], and the epoch with the true interval between the samples.
+
+    A clock that steps forward reads a given time earlier: the interval is shorter by the step.
+    """
+    rate_mps = np.where(np.isfinite(epoch.predicted_mps), epoch.predicted_mps, epoch.doppler_mps)
+    common_m, _ = _common(epoch.code_m - rate_mps * epoch.dt_s, params.min_satellites)
+    step_m = np.where(np.abs(common_m) > CLOCK_STEP_M, common_m, 0.0)
+    return epoch._replace(dt_s=epoch.dt_s - step_m / SPEED_OF_LIGHT_MPS), step_m[:, 0, 0]
+
+
+def _steps_to_follow(epoch: _Epoch, clock_step_m: FloatArray, params: SlipParams) -> FloatArray:
+    """Steps (R,) of whole milliseconds that the codes made and the carriers did not [m]."""
+    apart_m, enough = _common(epoch.code_m - epoch.carrier_m, params.min_satellites)
+    whole_m = np.round(apart_m / _MILLISECOND_M) * _MILLISECOND_M
+    whole = enough & (np.abs(apart_m - whole_m) < _WHOLE_MILLISECONDS_M)
+    result: FloatArray = np.where(whole[:, 0, 0] & (clock_step_m != 0.0), whole_m[:, 0, 0], 0.0)
+    return result
+
+
+def _tests(epoch: _Epoch, state: SlipState, dt_s: float, params: SlipParams) -> tuple[CauseArray, FloatArray]:
+    """Causes found by comparison with the past, and carrier rates [m/s] for the epochs to come."""
     jerk_mps3 = params.satellite_jerk_mps3 + params.receiver_jerk_mps3
-    code = np.abs(change_m - (code_m - state.code_m)) > params.code_base_m + params.code_rate_mps * dt_s
+    code = np.abs(epoch.carrier_m - epoch.code_m) > params.code_base_m + params.code_rate_mps * dt_s
 
-    doppler_m = change_m + 0.5 * dt_s * _LAMBDA_M * (doppler_hz + state.doppler_hz)
-    doppler_common_m, _ = _common(doppler_m, params.min_satellites)
+    beside_m = epoch.carrier_m - epoch.doppler_mps * epoch.dt_s
+    beside_common_m, _ = _common(beside_m, params.min_satellites)
     doppler_limit_m = params.doppler_base_m + params.doppler_noise_mps * dt_s + jerk_mps3 * dt_s**3 / 12.0
-    doppler = np.abs(doppler_m - doppler_common_m) > doppler_limit_m
+    doppler = np.abs(beside_m - beside_common_m) > doppler_limit_m
 
-    predicted_mps = state.rate_mps + state.acceleration_mps2 * (0.5 * (dt_s + state.dt_s))
-    ahead_m = change_m - predicted_mps * dt_s
-    ahead_common_m, enough = _common(ahead_m, params.min_satellites)
-    rate = enough & (np.abs(ahead_m - ahead_common_m) > params.rate_base_m + jerk_mps3 * dt_s**3)
+    ahead_m = epoch.carrier_m - epoch.predicted_mps * epoch.dt_s
+    ahead_common_m, enough_ahead = _common(ahead_m, params.min_satellites)
+    rate = enough_ahead & (np.abs(ahead_m - ahead_common_m) > params.rate_base_m + jerk_mps3 * dt_s**3)
 
-    range_m = change_m - (known_m - state.range_m)
-    range_common_m, enough_range = _common(range_m, params.min_satellites)
-    range_limit_m = params.rate_base_m + params.range_rate_mps * dt_s
-    rate |= enough_range & (np.abs(range_m - range_common_m) > range_limit_m)
+    off_m = epoch.carrier_m - epoch.range_m
+    off_common_m, enough_off = _common(off_m, params.min_satellites)
+    rate |= enough_off & (np.abs(off_m - off_common_m) > params.rate_base_m + params.range_rate_mps * dt_s)
 
-    followed = np.isfinite(doppler_m) | (enough & np.isfinite(ahead_m)) | (enough_range & np.isfinite(range_m))
-    geometry_free = _geometry_free(state, change_m, followed & ~doppler & ~rate, dt_s, params)
+    tested = np.isfinite(beside_m) | (enough_ahead & np.isfinite(ahead_m)) | (enough_off & np.isfinite(off_m))
+    apart = _geometry_free(epoch, state, tested & ~doppler & ~rate, dt_s, params)
     cause = _flag(code, SlipCause.CODE) | _flag(doppler, SlipCause.DOPPLER)
-    cause |= _flag(rate, SlipCause.RATE) | _flag(geometry_free, SlipCause.GEOMETRY_FREE)
-    step_m = np.where(enough, ahead_common_m, doppler_common_m)
-    return cause, step_m[:, 0, 0]
+    cause |= _flag(rate, SlipCause.RATE) | _flag(apart, SlipCause.GEOMETRY_FREE)
+    step_m = np.where(enough_ahead, ahead_common_m, beside_common_m)
+    step_m = np.where(np.abs(step_m) > CLOCK_STEP_M, step_m, 0.0)
+    return cause, (epoch.carrier_m - step_m) / epoch.dt_s
 
 
 def _common(residual_m: FloatArray, min_satellites: int) -> tuple[FloatArray, BoolArray]:
     """Median over satellites and bands (R, 1, 1), 0 if there are too few satellites, and whether there are enough."""
     present = np.isfinite(residual_m)
     enough = np.count_nonzero(present.any(axis=1), axis=-1) >= max(min_satellites, 1)
-    ordered = np.sort(np.where(present, residual_m, np.inf).reshape(len(residual_m), -1), axis=-1)
-    number = np.count_nonzero(present, axis=(1, 2))
+    ordered = np.sort(residual_m.reshape(len(residual_m), -1), axis=-1)  # NaN last
+    number = np.count_nonzero(present.reshape(ordered.shape), axis=-1)
     rows = np.arange(len(ordered))
     low, high = np.maximum(number - 1, 0) // 2, np.minimum(number // 2, ordered.shape[-1] - 1)
     median = np.where(enough, 0.5 * (ordered[rows, low] + ordered[rows, high]), 0.0)
@@ -272,33 +336,33 @@ def _common(residual_m: FloatArray, min_satellites: int) -> tuple[FloatArray, Bo
 
 
 def _geometry_free(
-    state: SlipState, change_m: FloatArray, consistent: BoolArray, dt_s: float, params: SlipParams
+    epoch: _Epoch, state: SlipState, consistent: BoolArray, dt_s: float, params: SlipParams
 ) -> BoolArray:
     """Bands taking part in a jump of a geometry-free difference, (R, N_BANDS, N_SATS).
 
     A jump between L1 and L2 is put down to L2 alone where L1 agrees with L5 and passed a test of its own: codeless
     tracking of L2 slips often, and L1 is what the corrections are made of.
     """
-    jumped15, tested15 = _pair_jump(state, change_m, L1, L5, dt_s, params)
-    jumped12, _ = _pair_jump(state, change_m, L1, L2, dt_s, params)
+    jumped15, tested15 = _pair_jump(epoch, state, L5, dt_s, params)
+    jumped12, _ = _pair_jump(epoch, state, L2, dt_s, params)
     cleared = tested15 & ~jumped15 & consistent[:, L1]
-    found = np.zeros(change_m.shape, dtype=bool)
+    found = np.zeros(consistent.shape, dtype=bool)
     found[:, L1] = jumped15 | (jumped12 & ~cleared)
-    found[:, L5] = jumped15
     found[:, L2] = jumped12
+    found[:, L5] = jumped15
     return found
 
 
 def _pair_jump(
-    state: SlipState, change_m: FloatArray, band: int, other: int, dt_s: float, params: SlipParams
+    epoch: _Epoch, state: SlipState, other: int, dt_s: float, params: SlipParams
 ) -> tuple[BoolArray, BoolArray]:
-    """Where the difference of two carriers jumped, and where it could be tested, both (R, N_SATS)."""
-    change = change_m[:, band] - change_m[:, other]
-    surprise = change - (state.rate_mps[:, band] - state.rate_mps[:, other]) * dt_s
-    followed = np.isfinite(surprise)
+    """Where the carrier of L1 minus that of another band jumped, and where it could be tested, both (R, N_SATS)."""
+    change_m = epoch.carrier_m[:, L1] - epoch.carrier_m[:, other]
+    surprise_m = change_m - (state.rate_mps[:, L1] - state.rate_mps[:, other]) * dt_s
+    followed = np.isfinite(surprise_m)
     limit_m = np.where(
         followed,
         params.geometry_free_base_m + params.geometry_free_acceleration_mps2 * dt_s**2,
         params.geometry_free_base_m + params.geometry_free_rate_mps * dt_s,
     )
-    return np.abs(np.where(followed, surprise, change)) > limit_m, np.isfinite(change)
+    return np.abs(np.where(followed, surprise_m, change_m)) > limit_m, np.isfinite(change_m)
