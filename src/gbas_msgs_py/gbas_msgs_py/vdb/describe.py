@@ -1,7 +1,8 @@
 """Message blocks as JSON documents with physical values, and back; what `gbas vdb decode` and `encode` do.
 
 A document is
-``{"blocks": [{"message_type": 1, "station_id": "CMJ", "crc_ok": true, "test": false, "fields": {...}}]}``. Field names are those of :mod:`gbas_msgs_py.vdb.messages`; angles are in degrees here (`_deg` for `_rad`); missing is
+``{"blocks": [{"message_type": 1, "station_id": "CMJ", "crc_ok": true, "test": false, "fields": {...}}]}``.
+Field names are those of :mod:`gbas_msgs_py.vdb.messages`; angles are in degrees here (`_deg` for `_rad`); missing is
 null, an unlimited distance is the text "unlimited".
 
 Bytes are written as in the published examples: data bytes with their first bit on the air as the least significant

@@ -170,7 +170,8 @@ def encode_symbols(bits: BitArray) -> SymbolArray:
 
 def decode_symbols(phases: SymbolArray) -> BitArray:
     """(3 n,) bits of (n,) absolute phases in units of pi/4; the phase before the first symbol counts as zero."""
-    changes = np.diff(phases.astype(np.int64), prepend=0) & 7
+    absolute = np.concatenate([[0], phases]).astype(np.int64)
+    changes = (absolute[1:] - absolute[:-1]) & 7
     index = _BITS_OF_PHASE[changes]
     return np.stack([index >> 2, index >> 1 & 1, index & 1], axis=1).reshape(-1).astype(np.uint8)
 

@@ -296,7 +296,16 @@ ADDITIONAL_BLOCKS: Final[dict[int, tuple[str, Layout]]] = {
 
 
 def _fpap_offset(name: str) -> Number:
-    return Number(name=name, bits=24, signed=True, minimum=-8_388_607, scale=_ANGLE, unit="rad", doc="FPAP less LTP")
+    return Number(
+        name=name,
+        bits=24,
+        signed=True,
+        minimum=-_COUNTS_PER_DEGREE,
+        maximum=_COUNTS_PER_DEGREE,
+        scale=_ANGLE,
+        unit="rad",
+        doc="FPAP less LTP",
+    )
 
 
 FAS_BLOCK: Final = Layout(
