@@ -44,6 +44,9 @@ CLOCK_STEP_M: Final = 150.0
 
 _LAMBDA_M: Final = WAVELENGTH_M[:, np.newaxis]
 _MILLISECOND_M: Final = SPEED_OF_LIGHT_MPS * 1e-3
+_FIT_UNKNOWNS: Final = 4
+_FIT_MAX_CONDITION: Final = 100.0
+_FIT_MIN_REDUNDANCY: Final = 0.05
 _WHOLE_MILLISECONDS_M: Final = 15.0  # a code step this close to whole milliseconds is one
 
 
@@ -198,6 +201,7 @@ def slip_step(
     params: SlipParams,
     *,
     range_m: FloatArray | None = None,
+    los: FloatArray | None = None,
 ) -> tuple[SlipState, SlipResult]:
     """Test one epoch of several receivers.
 
@@ -213,6 +217,10 @@ def slip_step(
     range_m : (R, N_SATS) array, optional
         Geometric range minus satellite clock, where the receiver's position is known [m]; the rate test then needs no
         history and stays sharp at long intervals. NaN for satellites without an ephemeris.
+    los : (R, 3, N_SATS) array, optional
+        Unit vectors to the satellites in any frame, good to a milliradian; NaN where unknown. With them the rate test
+        fits and removes the receiver's motion, and ``receiver_jerk_mps3`` no longer blunts it, as long as there are
+        two satellites more than the fit needs.
 
     Returns
     -------
@@ -229,7 +237,7 @@ def slip_step(
             step_m = _steps_to_follow(epoch, clock_step_m, params)
             followed_m, carrier_m = followed_m + step_m, carrier_m + step_m[:, np.newaxis, np.newaxis]
             epoch = epoch._replace(carrier_m=carrier_m - state.carrier_m)
-        found, rate_mps = _tests(epoch, state, dt_s, params)
+        found, rate_mps = _tests(epoch, state, los, dt_s, params)
         cause |= found
         rate_mps = np.where(cause == 0, rate_mps, np.nan)
     else:
@@ -296,10 +304,12 @@ def _steps_to_follow(epoch: _Epoch, clock_step_m: FloatArray, params: SlipParams
     return result
 
 
-def _tests(epoch: _Epoch, state: SlipState, dt_s: float, params: SlipParams) -> tuple[CauseArray, FloatArray]:
+def _tests(
+    epoch: _Epoch, state: SlipState, los: FloatArray | None, dt_s: float, params: SlipParams
+) -> tuple[CauseArray, FloatArray]:
     """Causes found by comparison with the past, and carrier rates [m/s] for the epochs to come."""
-    jerk_mps3 = params.satellite_jerk_mps3 + params.receiver_jerk_mps3
     code = np.abs(epoch.carrier_m - epoch.code_m) > params.code_base_m + params.code_rate_mps * dt_s
+    jerk_mps3 = params.satellite_jerk_mps3 + params.receiver_jerk_mps3
 
     beside_m = epoch.carrier_m - epoch.doppler_mps * epoch.dt_s
     beside_common_m, _ = _common(beside_m, params.min_satellites)
@@ -308,19 +318,66 @@ def _tests(epoch: _Epoch, state: SlipState, dt_s: float, params: SlipParams) -> 
 
     ahead_m = epoch.carrier_m - epoch.predicted_mps * epoch.dt_s
     ahead_common_m, enough_ahead = _common(ahead_m, params.min_satellites)
-    rate = enough_ahead & (np.abs(ahead_m - ahead_common_m) > params.rate_base_m + jerk_mps3 * dt_s**3)
+    rate, tested = _rate_test(ahead_m - ahead_common_m, enough_ahead, los, dt_s, params)
 
     off_m = epoch.carrier_m - epoch.range_m
     off_common_m, enough_off = _common(off_m, params.min_satellites)
     rate |= enough_off & (np.abs(off_m - off_common_m) > params.rate_base_m + params.range_rate_mps * dt_s)
 
-    tested = np.isfinite(beside_m) | (enough_ahead & np.isfinite(ahead_m)) | (enough_off & np.isfinite(off_m))
+    tested = tested | np.isfinite(beside_m) | (enough_off & np.isfinite(off_m))
     apart = _geometry_free(epoch, state, tested & ~doppler & ~rate, dt_s, params)
     cause = _flag(code, SlipCause.CODE) | _flag(doppler, SlipCause.DOPPLER)
     cause |= _flag(rate, SlipCause.RATE) | _flag(apart, SlipCause.GEOMETRY_FREE)
     step_m = np.where(enough_ahead, ahead_common_m, beside_common_m)
     step_m = np.where(np.abs(step_m) > CLOCK_STEP_M, step_m, 0.0)
     return cause, (epoch.carrier_m - step_m) / epoch.dt_s
+
+
+def _rate_test(
+    surprise_m: FloatArray, enough: BoolArray, los: FloatArray | None, dt_s: float, params: SlipParams
+) -> tuple[BoolArray, BoolArray]:
+    """Where a carrier left its extrapolation, and where that could be tested, both (R, N_BANDS, N_SATS)."""
+    still_limit_m = params.rate_base_m + params.satellite_jerk_mps3 * dt_s**3
+    moving_limit_m = still_limit_m + params.receiver_jerk_mps3 * dt_s**3
+    found = enough & (np.abs(surprise_m) > moving_limit_m)
+    tested = enough & np.isfinite(surprise_m)
+    if los is not None:
+        for receiver in range(len(surprise_m)):
+            motionless = _without_motion(surprise_m[receiver], los[receiver], still_limit_m)
+            if motionless is not None:
+                found[receiver] |= np.abs(motionless) > still_limit_m
+    return found, tested
+
+
+def _without_motion(surprise_m: FloatArray, los: FloatArray, limit_m: float) -> FloatArray | None:
+    """Surprises (N_BANDS, N_SATS) of one receiver less the motion and clock that explain most of them.
+
+    Satellites that disagree are left out of the fit one after the other, the worst first; a surprise that takes part is
+    scaled up for its pull on the fit. None if there are too few satellites to tell motion from slips; infinite surprises
+    if there are too few left that agree.
+    """
+    rows = np.isfinite(surprise_m) & np.isfinite(los).all(axis=0)
+    satellite = np.nonzero(rows)[1]
+    design = np.concatenate([-los, np.ones((1, los.shape[-1]))])[:, satellite].T
+    value_m, kept = surprise_m[rows], np.ones(len(satellite), dtype=bool)
+    while np.unique(satellite[kept]).size >= _FIT_UNKNOWNS + 2:
+        left, singular, right = np.linalg.svd(design[kept], full_matrices=False)
+        if not singular[0] <= _FIT_MAX_CONDITION * singular[-1]:
+            break
+        projected_m = left.T @ value_m[kept]
+        redundancy = np.maximum(1.0 - np.einsum("ij,ij->i", left, left), _FIT_MIN_REDUNDANCY)
+        rest_m = np.abs(value_m[kept] - left @ projected_m) / np.sqrt(redundancy)
+        worst = int(np.argmax(rest_m))
+        if rest_m[worst] <= limit_m:
+            return _on_rows(value_m - design @ (right.T @ (projected_m / singular)), rows)
+        kept &= satellite != satellite[kept][worst]
+    return None if kept.all() else _on_rows(np.full(len(satellite), np.inf), rows)
+
+
+def _on_rows(value: FloatArray, rows: BoolArray) -> FloatArray:
+    result = np.full(rows.shape, np.nan)
+    result[rows] = value
+    return result
 
 
 def _common(residual_m: FloatArray, min_satellites: int) -> tuple[FloatArray, BoolArray]:
