@@ -1,0 +1,278 @@
+"""``gbas process``: recorded receiver files through the whole chain, offline."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from gbas_airborne.params import AirborneParams
+from gbas_bringup.definitions import config_path
+from gbas_bringup.errors import ConfigError, GbasError
+from gbas_bringup.results import Row, summarise, write_json, write_solution_csv
+from gbas_core.frames import geodetic_from_ecef
+from gbas_core.gpstime import from_epoch_key
+from gbas_core.observations import ObservationEpoch
+from gbas_core.recording import RecordedEpoch, Recording
+from gbas_ground.params import GroundParams, ground_section
+from gbas_msgs_py.events import Event, EventKind
+from gbas_studies.chain import AirborneOutput, Chain
+
+NOMINAL_STATION = "nominal_station.yaml"
+"""Station values assumed for recorded data when no station file is given; a file a person can read and copy."""
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProcessRequest:
+    """What to process.
+
+    Attributes
+    ----------
+    ground : tuple of Path
+        Observation files of one to four reference receivers.
+    ground_xyz_m : tuple of (x, y, z)
+        Their antenna positions, ECEF [m]; empty takes the approximate positions of the file headers, and says so.
+    user : Path
+        Observation file of the user.
+    navigation, user_navigation : tuple of Path
+        Navigation files; the user's own only when they differ.
+    service : str
+        Service type, ``"C"``.
+    systems : str
+        Satellite systems, ``"G"``, ``"E"`` or ``"GE"``.
+    station, fas, airborne : Path or None
+        Configuration files: station (section ``ground``), final approach, airborne receiver (section ``airborne``).
+    """
+
+    ground: tuple[Path, ...]
+    user: Path
+    navigation: tuple[Path, ...]
+    ground_xyz_m: tuple[tuple[float, float, float], ...] = ()
+    user_navigation: tuple[Path, ...] = ()
+    service: str = "C"
+    systems: str = "G"
+    station: Path | None = None
+    fas: Path | None = None
+    airborne: Path | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProcessResult:
+    """Everything a run gave.
+
+    Attributes
+    ----------
+    rows : tuple of Row
+        One for each epoch of the user.
+    outputs : tuple of AirborneOutput
+        The records behind the rows.
+    events : tuple of Event
+        Of both ends, in order.
+    notes : tuple of str
+        What was assumed, left out or repaired.
+    ground : GroundParams
+    airborne : AirborneParams
+    """
+
+    rows: tuple[Row, ...]
+    outputs: tuple[AirborneOutput, ...]
+    events: tuple[Event, ...]
+    notes: tuple[str, ...]
+    ground: GroundParams
+    airborne: AirborneParams
+
+    def summary(self) -> dict[str, Any]:
+        """Body of ``summary.json``."""
+        return {
+            **summarise(self.rows),
+            "events": _event_counts(self.events),
+            "notes": list(self.notes),
+            "station": {"id": self.ground.station_id, "designator": self.ground.accuracy_designator},
+            "simulated": False,
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class Prepared:
+    """A recording with the parameters it is processed with."""
+
+    recording: Recording
+    ground: GroundParams
+    airborne: AirborneParams
+    notes: tuple[str, ...]
+
+    def epochs(self) -> list[RecordedEpoch]:
+        """The epochs in which both the station and the user were observing."""
+        first, last = self.recording.overlap
+        return list(self.recording.epochs(first=first, last=last))
+
+    def chain(self) -> Chain:
+        """A chain that has seen nothing yet."""
+        return Chain(
+            self.ground, self.airborne, self.recording.ephemerides(), self.recording.user_ephemerides()
+        )
+
+
+def prepare(request: ProcessRequest) -> Prepared:
+    """Read the files and make the parameters.
+
+    Raises
+    ------
+    RinexError, RecordingError, GbasError, ValueError
+        With one line that names what cannot be used.
+    """
+    if request.ground_xyz_m and len(request.ground_xyz_m) != len(request.ground):
+        raise GbasError(
+            f"--ground-xyz: {len(request.ground_xyz_m)} positions for {len(request.ground)} ground files; expected one each"
+        )
+    recording = Recording.open(
+        request.ground, request.user, request.navigation, user_navigation=request.user_navigation
+    )
+    notes = list(recording.notes())
+    ground = _ground_params(request, recording, notes)
+    airborne = _airborne_params(request, recording, ground, notes)
+    return Prepared(recording=recording, ground=ground, airborne=airborne, notes=tuple(notes))
+
+
+def process(request: ProcessRequest, *, progress: Progress | None = None) -> ProcessResult:
+    """Run the chain over recorded files; `progress` is called with epochs done and epochs in all."""
+    prepared = prepare(request)
+    epochs = prepared.epochs()
+    outputs: list[AirborneOutput] = []
+    events: list[Event] = []
+    for done, output in enumerate(prepared.chain().run(_counted(epochs, progress))):
+        events += output.events
+        if isinstance(output, AirborneOutput):
+            outputs.append(output)
+    return ProcessResult(
+        rows=tuple(Row.of(output.solution, output.protection) for output in outputs),
+        outputs=tuple(outputs),
+        events=tuple(events),
+        notes=prepared.notes,
+        ground=prepared.ground,
+        airborne=prepared.airborne,
+    )
+
+
+def write_results(result: ProcessResult, out: Path) -> dict[str, Any]:
+    """Write ``solution.csv``, ``summary.json`` and ``events.jsonl`` into a folder; returns the summary."""
+    out.mkdir(parents=True, exist_ok=True)
+    write_solution_csv(out / "solution.csv", result.rows)
+    (out / "events.jsonl").write_text("".join(event.to_json() + "\n" for event in result.events), encoding="utf-8")
+    summary = result.summary()
+    write_json(out / "summary.json", summary)
+    return summary
+
+
+def _counted(epochs: Sequence[RecordedEpoch], progress: Progress | None) -> Any:
+    for done, epoch in enumerate(epochs, start=1):
+        yield epoch
+        if progress is not None:
+            progress(done, len(epochs))
+
+
+def _event_counts(events: Sequence[Event]) -> dict[str, int]:
+    counts: dict[str, int] = {}
+    for event in events:
+        if event.kind is not EventKind.FINISHED:
+            name = f"{event.kind.value}:{event.cause}"
+            counts[name] = counts.get(name, 0) + 1
+    return dict(sorted(counts.items()))
+
+
+def _document(path: Path) -> Any:
+    try:
+        return yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(path, f"cannot be read: {error}") from None
+    except yaml.YAMLError as error:
+        raise ConfigError(path, f"is not YAML: {error}") from None
+
+
+def _ground_params(request: ProcessRequest, recording: Recording, notes: list[str]) -> GroundParams:
+    path = request.station or config_path(NOMINAL_STATION)
+    if request.station is None:
+        notes.append(f"no station file: nominal values of {NOMINAL_STATION} are assumed")
+    sections = {name: dict(section) for name, section in ground_section(_document(path), str(path)).items()}
+    positions = request.ground_xyz_m or _header_positions(recording, notes)
+    latitude, longitude, height = geodetic_from_ecef(np.array(positions[0]))
+    station = sections.setdefault("station", {})
+    if request.station is None or "latitude_deg" not in station:
+        station |= {
+            "latitude_deg": float(np.degrees(latitude)),
+            "longitude_deg": float(np.degrees(longitude)),
+            "height_m": float(height),
+        }
+    station["systems"] = request.systems
+    receivers = sections.setdefault("receivers", {})
+    for key in [key for key in receivers if key.endswith("_ecef_m")]:
+        del receivers[key]
+    receivers |= {f"rr{number}_ecef_m": list(place) for number, place in enumerate(positions, start=1)}
+    receivers.setdefault("minimum", min(2, len(positions)))
+    smoothing = sections.setdefault("smoothing", {})
+    smoothing.setdefault("max_gap_s", max(3.5, 1.5 * max(file.interval_s or 0.0 for file in recording.ground)))
+    monitors = sections.setdefault("monitors", {})
+    without = [file.path.name for file in recording.ground if not np.isfinite(file.cn0_dbhz[:, 0]).any()]
+    if without and "require_cn0" not in monitors:
+        monitors["require_cn0"] = False
+        notes.append(f"{', '.join(without)}: no C/N0 in the file, so signal power is not monitored")
+    if request.fas is not None:
+        sections["approaches"] = {"fas": _fas(request.fas)}
+    return GroundParams.from_mapping(sections, source=str(path))
+
+
+def _header_positions(recording: Recording, notes: list[str]) -> tuple[tuple[float, float, float], ...]:
+    positions = []
+    for file in recording.ground:
+        if file.approx_position_m is None:
+            raise GbasError(f"{file.path}: header has no APPROX POSITION XYZ; give the antenna position with --ground-xyz")
+        notes.append(f"{file.path.name}: antenna position taken from the header, where it may be approximate")
+        x, y, z = (float(value) for value in file.approx_position_m)
+        positions.append((x, y, z))
+    return tuple(positions)
+
+
+def _fas(path: Path) -> Mapping[str, Any]:
+    document = _document(path)
+    fas = document.get("fas", document) if isinstance(document, Mapping) else None
+    if not isinstance(fas, Mapping):
+        raise ConfigError(path, "is no mapping of final approach fields")
+    return fas
+
+
+def _airborne_params(
+    request: ProcessRequest, recording: Recording, ground: GroundParams, notes: list[str]
+) -> AirborneParams:
+    document = {} if request.airborne is None else _document(request.airborne) or {}
+    for key in ("/**", "ros__parameters", "airborne"):
+        document = document.get(key, document)
+    given = dict(document)
+    known = {item.name for item in fields(AirborneParams)}
+    assert recording.user is not None
+    defaults: dict[str, Any] = {
+        "service": request.service,
+        "systems": request.systems,
+        "max_gap_s": max(3.5, 1.5 * (recording.user.interval_s or 0.0)),
+    }
+    if ground.approaches:
+        defaults["rpds"] = ground.approaches[0].rpds
+    if unknown := sorted(set(given) - known):
+        raise ConfigError(request.airborne or "airborne", f"is not one of {', '.join(sorted(known))}", unknown[0])
+    try:
+        return AirborneParams.from_mapping({**defaults, **given})
+    except ValueError as error:
+        raise ConfigError(request.airborne or "gbas process", str(error)) from None
+
+
+def observation_or_empty(observation: ObservationEpoch | None, key: int) -> ObservationEpoch:
+    """The observations of an epoch, or an epoch without any: what the replay node sends when a receiver has no data."""
+    if observation is not None:
+        return observation
+    week, tow_s = from_epoch_key(key)
+    return ObservationEpoch(gps_week=week, tow_s=tow_s)
