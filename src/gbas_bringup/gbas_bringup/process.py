@@ -11,8 +11,8 @@ import numpy as np
 import yaml
 
 from gbas_airborne.params import AirborneParams
-from gbas_bringup.definitions import config_path
 from gbas_bringup.errors import ConfigError, GbasError
+from gbas_bringup.resources import config_path
 from gbas_bringup.results import Row, summarise, write_json, write_solution_csv
 from gbas_core.frames import geodetic_from_ecef
 from gbas_core.gpstime import from_epoch_key
