@@ -1,0 +1,140 @@
+"""From integrity to the air: one epoch's corrections as the bursts of one frame.
+
+Nothing is broadcast that the integrity epoch does not call usable and complete. A station without corrections stays on
+the air with an empty type 1 message and says that it is not healthy.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+
+from gbas_core.gpstime import epoch_key
+from gbas_core.record import FloatArray
+from gbas_core.satellites import RANGING_SOURCE_ID
+from gbas_ground.corrections import BoolArray
+from gbas_ground.monitors.multiple_reference import MAX_B_VALUE_M
+from gbas_ground.params import MIN_SERVICE_SATELLITES, GroundParams
+from gbas_ground.sigma import MAX_SIGMA_M
+from gbas_msgs_py.records import ChannelState, IntegrityEpoch
+from gbas_msgs_py.vdb.burst import FRAME_DURATION_S, Burst
+from gbas_msgs_py.vdb.messages import Correction30, Correction100, FasDataSet, Type2
+from gbas_msgs_py.vdb.schedule import (
+    Frame,
+    ScheduleParams,
+    ScheduleState,
+    SourceCorrection,
+    schedule_frame,
+    sources_that_fit,
+)
+
+_FRAME_MS: Final = round(1000 * FRAME_DURATION_S)
+_IOD_MODULUS: Final = 256
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BroadcastState:
+    """What the broadcast remembers.
+
+    Attributes
+    ----------
+    schedule : ScheduleState
+    key : int or None
+        Epoch of the last frame [ms since the start of GPS time].
+    """
+
+    schedule: ScheduleState = field(default_factory=ScheduleState)
+    key: int | None = None
+
+
+def empty_integrity(gps_week: int, tow_s: float) -> IntegrityEpoch:
+    """An epoch at which nothing is known, so nothing is used."""
+    return IntegrityEpoch(gps_week=gps_week, tow_s=tow_s, n_receivers=0.0)
+
+
+def broadcastable(integrity: IntegrityEpoch, params: GroundParams) -> BoolArray:
+    """Satellites whose corrections are usable, complete and within what the messages can carry, ``(N,)``."""
+    b = np.where(np.isnan(integrity.b_m), 0.0, np.abs(integrity.b_m)).max(axis=0)
+    ok = (integrity.state == ChannelState.USABLE) & np.isfinite(integrity.iod) & np.isfinite(integrity.ephemeris_crc)
+    for prc, rrc in (
+        (integrity.prc_100_m, integrity.rrc_100_mps),
+        (integrity.prc_30_m, integrity.rrc_30_mps),
+    ):
+        ok = ok & (np.abs(prc) <= params.max_prc_m) & (np.abs(rrc) <= params.max_rrc_mps)
+    for sigma in (integrity.sigma_pr_gnd_m, integrity.sigma_pr_gnd_d_m, integrity.sigma_pr_gnd_30_m):
+        ok = ok & (sigma > 0.0) & (sigma <= MAX_SIGMA_M)
+    return np.asarray(ok & (b <= MAX_B_VALUE_M))
+
+
+@lru_cache(maxsize=8)
+def _constants(params: GroundParams) -> tuple[Type2, Type2, tuple[FasDataSet, ...], ScheduleParams, int]:
+    """Station data (healthy and not), approaches, schedule settings and how many satellites fit."""
+    healthy, unhealthy = params.station_message(), params.station_message(healthy=False)
+    approaches, schedule = params.approach_messages(), params.schedule()
+    return healthy, unhealthy, approaches, schedule, sources_that_fit(healthy, approaches, schedule)
+
+
+def broadcast_frame(
+    state: BroadcastState, integrity: IntegrityEpoch, params: GroundParams
+) -> tuple[BroadcastState, tuple[Burst, ...]]:
+    """Bursts of the frame that begins at the integrity's epoch.
+
+    An epoch that is not later than the last frame, or is not at the start of a frame, gives no bursts. When more
+    satellites are usable than the slots hold, the lowest are left out.
+    """
+    key = epoch_key(integrity.gps_week, integrity.tow_s)
+    if key % _FRAME_MS or (state.key is not None and key <= state.key):
+        return state, ()
+    healthy, unhealthy, approaches, schedule, room = _constants(params)
+    usable = broadcastable(integrity, params)
+    serves = bool(integrity.n_receivers >= params.min_receivers)
+    satellites = _highest(usable, integrity.elevation_rad, room) if serves else ()
+    serves = len(satellites) >= MIN_SERVICE_SATELLITES
+    frame = Frame(
+        gps_week=integrity.gps_week,
+        tow_s=integrity.tow_s,
+        sources=tuple(_source(integrity, satellite, params) for satellite in satellites),
+        station=healthy if serves else unhealthy,
+        approaches=approaches,
+    )
+    scheduled, bursts = schedule_frame(state.schedule, frame, schedule)
+    return BroadcastState(schedule=scheduled, key=key), bursts
+
+
+def _highest(usable: BoolArray, elevation_rad: FloatArray, room: int) -> tuple[int, ...]:
+    """The satellites to send, in their order on the axis."""
+    satellites = np.flatnonzero(usable)
+    if len(satellites) > room:
+        order = np.argsort(-elevation_rad[satellites], kind="stable")
+        satellites = np.sort(satellites[order[:room]])
+    return tuple(satellites.tolist())
+
+
+def _source(integrity: IntegrityEpoch, satellite: int, params: GroundParams) -> SourceCorrection:
+    number = int(RANGING_SOURCE_ID[satellite])
+    b1, b2, b3, b4 = (float(value) for value in integrity.b_m[:, satellite])
+    correction = Correction100(
+        ranging_source_id=number,
+        iod=int(integrity.iod[satellite]) % _IOD_MODULUS,
+        prc_m=float(integrity.prc_100_m[satellite]),
+        rrc_mps=float(integrity.rrc_100_mps[satellite]),
+        sigma_pr_gnd_m=float(integrity.sigma_pr_gnd_m[satellite]),
+        b_values_m=(b1, b2, b3, b4),
+    )
+    correction_30 = Correction30(
+        ranging_source_id=number,
+        prc_30_m=float(integrity.prc_30_m[satellite]),
+        rrc_30_mps=float(integrity.rrc_30_mps[satellite]),
+        sigma_pr_gnd_d_m=float(integrity.sigma_pr_gnd_d_m[satellite]),
+        sigma_pr_gnd_30_m=float(integrity.sigma_pr_gnd_30_m[satellite]),
+    )
+    return SourceCorrection(
+        correction=correction,
+        correction_30=correction_30 if params.gast_d else None,
+        ephemeris_crc=int(integrity.ephemeris_crc[satellite]),
+        ephemeris_decorrelation=params.p_ephemeris,
+        ephemeris_decorrelation_d=params.p_ephemeris_d,
+    )

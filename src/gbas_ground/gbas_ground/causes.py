@@ -1,0 +1,52 @@
+"""Why the ground station does not use something."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import Final
+
+
+class ExclusionCause(IntEnum):
+    """Cause of an exclusion, as carried in the integrity table; numbers are never given a second meaning.
+
+    Below 32: states of affairs, which end when they end. From 32 on: a monitor failed; use begins again only after the
+    re-admission time without a failure.
+    """
+
+    NONE = 0
+    NOT_TRACKED = 1
+    """No reference receiver tracks the satellite."""
+    SETTLING = 2
+    """The smoothing filters have not run long enough."""
+    BELOW_MASK = 3
+    """Lower than the elevation mask."""
+    NO_EPHEMERIS = 4
+    """No settled, healthy, valid ephemeris."""
+    TOO_FEW_RECEIVERS = 5
+    """Fewer channels than the station needs behind a correction."""
+    TOO_FEW_COMMON_SATELLITES = 6
+    """Receiver clocks of the constellation cannot be removed."""
+    SIGMA_TOO_LARGE = 7
+    """The sigma does not fit in the message."""
+    NO_RATE = 8
+    """No previous epoch to form a range rate correction with."""
+    B_VALUE = 32
+    """A B value above its threshold (multiple reference consistency check)."""
+    RECEIVER_FAULT = 33
+    """Several channels of one receiver failed by B values."""
+    PRC_LIMIT = 34
+    """Pseudorange correction above its limit."""
+    RRC_LIMIT = 35
+    """Range rate correction above its limit."""
+    RANGE_RESIDUAL = 36
+    """Raw pseudorange far from the expected one."""
+    SIGNAL_POWER = 37
+    """C/N0 below the minimum, or not given."""
+
+    @property
+    def word(self) -> str:
+        """The cause as it stands in an event."""
+        return self.name.lower()
+
+
+FIRST_LATCHED: Final = 32

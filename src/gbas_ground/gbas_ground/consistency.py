@@ -1,0 +1,325 @@
+"""Corrections that agree: form them, exclude what disagrees, form them again.
+
+What is excluded leaves the clock's common set and the means, and the rest is formed and judged again, until nothing
+fails. One thing goes at a time, the worst first: a single bad channel shifts its receiver's clock and with it all the
+receiver's corrections, which must not be blamed for it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gbas_core.record import FloatArray
+from gbas_core.satellites import N_SATS, SAT_IDS
+from gbas_ground import corrections as form
+from gbas_ground.causes import ExclusionCause
+from gbas_ground.corrections import CLOCK_GROUPS, BoolArray
+from gbas_ground.executive import Latch, exclude, initial_latch
+from gbas_ground.monitors.correction_limits import check_correction
+from gbas_ground.monitors.multiple_reference import channel_sigma_m, check_b_values, check_unused
+from gbas_ground.monitors.result import MonitorResult
+from gbas_ground.params import GroundParams
+from gbas_ground.sigma import Sigmas, broadcast_sigmas
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Measured:
+    """What the corrections are formed from at one epoch.
+
+    Attributes
+    ----------
+    correction_m : (tau, R, N) array
+        PR_sc, with the receiver clocks [m].
+    previous_m : (tau, R, N) array
+        PR_sc of the epoch before with today's ephemerides [m].
+    dt_s : float
+        Time since then [s]; NaN when there was none.
+    settled : (R, N) bool array
+        Channels that may be used unless something excludes them.
+    elevation_rad : (N,) array
+    """
+
+    correction_m: FloatArray
+    previous_m: FloatArray
+    dt_s: float
+    settled: BoolArray
+    elevation_rad: FloatArray
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Exclusions:
+    """The latches of a station: channels ``(R, N)``, receivers ``(R,)``, satellites ``(N,)``."""
+
+    channels: Latch
+    receivers: Latch
+    satellites: Latch
+
+    def usable_channels(self) -> BoolArray:
+        """Channels that neither are excluded nor belong to an excluded receiver, ``(R, N)``."""
+        return ~self.channels.excluded & ~self.receivers.excluded[:, np.newaxis]
+
+
+def no_exclusions(params: GroundParams) -> Exclusions:
+    """Nothing is excluded."""
+    return Exclusions(
+        channels=initial_latch(params.n_receivers, N_SATS),
+        receivers=initial_latch(params.n_receivers),
+        satellites=initial_latch(N_SATS),
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Corrections:
+    """Corrections of one epoch; a satellite that is excluded has them too, for its own monitoring.
+
+    Attributes
+    ----------
+    in_use : (k, R) bool array
+        Receivers in use, by constellation.
+    common : (k, N) bool array
+        Satellites the clocks are removed with.
+    weights : (k, N) array
+    used : (R, N) bool array
+        Channels behind each correction; `count` ``(N,)`` is their number.
+    prc_m, rrc_mps : (tau, N) arrays
+    b_m : (tau, R, N) array
+    sigmas : Sigmas
+    channel_sigma_m : (tau, N) array
+        One receiver's sigma, for the thresholds [m].
+    """
+
+    in_use: BoolArray
+    common: BoolArray
+    weights: FloatArray
+    used: BoolArray
+    count: FloatArray
+    prc_m: FloatArray
+    rrc_mps: FloatArray
+    b_m: FloatArray
+    sigmas: Sigmas
+    channel_sigma_m: FloatArray
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """One exclusion made: what, why, and by how much."""
+
+    subject: str
+    cause: ExclusionCause
+    value: float
+    threshold: float
+
+
+def form_corrections(measured: Measured, exclusions: Exclusions, params: GroundParams) -> Corrections:
+    """Corrections from everything that is not excluded."""
+    usable = measured.settled & exclusions.usable_channels()
+    in_use, common = form.common_satellites(
+        usable & ~exclusions.satellites.excluded,
+        min_common=params.min_common_satellites,
+        min_receivers=params.min_receivers,
+    )
+    elevation = None if params.clock_weighting == "plain" else measured.elevation_rad
+    weights = form.clock_weights(common, elevation)
+    adjusted = measured.correction_m - form.receiver_clock_m(measured.correction_m, weights)
+    used = usable & in_use[0][:, np.newaxis] & CLOCK_GROUPS[0] | usable & in_use[1][:, np.newaxis] & CLOCK_GROUPS[1]
+    used = used & np.isfinite(adjusted).all(axis=0)
+    count = used.sum(axis=0).astype(np.float64)
+    sigmas = broadcast_sigmas(params, measured.elevation_rad, count)
+    rate = form.rate_mps(measured.correction_m, measured.previous_m, measured.dt_s, weights, used)
+    return Corrections(
+        in_use=in_use,
+        common=common,
+        weights=weights,
+        used=used,
+        count=count,
+        prc_m=form.average_m(adjusted, used),
+        rrc_mps=rate,
+        b_m=form.b_values_m(adjusted, used),
+        sigmas=sigmas,
+        channel_sigma_m=channel_sigma_m(np.stack([sigmas.gnd_d_m, sigmas.gnd_30_m]), count, weights),
+    )
+
+
+def b_value_check(made: Corrections, params: GroundParams) -> MonitorResult:
+    """B values of both smoothing constants, ``(tau, R, N)``."""
+    return check_b_values(made.b_m, made.channel_sigma_m, made.used, params.k_b)
+
+
+def limit_checks(made: Corrections, params: GroundParams) -> tuple[tuple[ExclusionCause, MonitorResult], ...]:
+    """Sizes of PRC and, where there is one, RRC, ``(tau, N)`` each."""
+    has = made.count > 0
+    has_rate = has & np.isfinite(made.rrc_mps).all(axis=0)
+    return (
+        (ExclusionCause.PRC_LIMIT, check_correction(made.prc_m, has, params.max_prc_m)),
+        (ExclusionCause.RRC_LIMIT, check_correction(made.rrc_mps, has_rate, params.max_rrc_mps)),
+    )
+
+
+def agree(
+    measured: Measured, exclusions: Exclusions, params: GroundParams
+) -> tuple[Corrections, Exclusions, tuple[Finding, ...]]:
+    """Exclude what disagrees, one thing at a time, until the rest agrees.
+
+    Returns
+    -------
+    corrections : Corrections
+        Formed from what is left.
+    exclusions : Exclusions
+    findings : tuple of Finding
+        What was excluded, in that order.
+    """
+    findings: list[Finding] = []
+    while True:
+        made = form_corrections(measured, exclusions, params)
+        step = _worst_b_value(made, exclusions, params) or _worst_limit(made, exclusions, params)
+        if step is None:
+            return made, exclusions, tuple(findings)
+        exclusions, finding = step
+        findings.append(finding)
+
+
+_Step = tuple[Exclusions, Finding]
+
+
+def _ratio(result: MonitorResult) -> FloatArray:
+    """Statistic over threshold where the monitor failed, else 0; a missing statistic is infinitely bad."""
+    ratio = np.where(result.failed, result.statistic / result.threshold, 0.0)
+    return np.where(np.isnan(ratio), np.inf, ratio)
+
+
+def _worst_b_value(made: Corrections, exclusions: Exclusions, params: GroundParams) -> _Step | None:
+    result = b_value_check(made, params)
+    if not result.failed.any():
+        return None
+    # Two receivers do not tell which is wrong: then it is the satellite, once.
+    actionable = (made.count >= 3) | ~exclusions.satellites.excluded
+    ratio = np.where(actionable, _ratio(result), 0.0)
+    tau, receiver, satellite = (int(place) for place in np.unravel_index(int(ratio.argmax()), ratio.shape))
+    if ratio[tau, receiver, satellite] == 0.0:
+        return None
+    value, threshold = result.at(tau, receiver, satellite)
+    if made.count[satellite] < 3:
+        failed = np.arange(ratio.shape[-1]) == satellite
+        latch = exclude(exclusions.satellites, failed, ExclusionCause.B_VALUE)
+        finding = Finding(subject=SAT_IDS[satellite], cause=ExclusionCause.B_VALUE, value=value, threshold=threshold)
+        return replace(exclusions, satellites=latch), finding
+    mask = np.zeros(ratio.shape[1:], dtype=bool)
+    mask[receiver, satellite] = True
+    channels = exclude(exclusions.channels, mask, ExclusionCause.B_VALUE)
+    faults = int((channels.cause[receiver] == ExclusionCause.B_VALUE).sum())
+    if faults >= params.receiver_fault_channels:
+        latch = exclude(exclusions.receivers, np.arange(len(mask)) == receiver, ExclusionCause.RECEIVER_FAULT)
+        finding = Finding(
+            subject=f"rr{receiver + 1}",
+            cause=ExclusionCause.RECEIVER_FAULT,
+            value=float(faults),
+            threshold=float(params.receiver_fault_channels),
+        )
+        return replace(exclusions, channels=channels, receivers=latch), finding
+    subject = f"rr{receiver + 1}/{SAT_IDS[satellite]}"
+    finding = Finding(subject=subject, cause=ExclusionCause.B_VALUE, value=value, threshold=threshold)
+    return replace(exclusions, channels=channels), finding
+
+
+def _worst_limit(made: Corrections, exclusions: Exclusions, params: GroundParams) -> _Step | None:
+    best: tuple[float, ExclusionCause, MonitorResult, tuple[int, ...]] | None = None
+    for cause, result in limit_checks(made, params):
+        ratio = np.where(exclusions.satellites.excluded, 0.0, _ratio(result))
+        place = tuple(int(each) for each in np.unravel_index(int(ratio.argmax()), ratio.shape))
+        if ratio[place] > (best[0] if best else 0.0):
+            best = (float(ratio[place]), cause, result, place)
+    if best is None:
+        return None
+    _, cause, result, (tau, satellite) = best
+    latch = exclude(exclusions.satellites, np.arange(made.count.shape[-1]) == satellite, cause)
+    value, threshold = result.at(tau, satellite)
+    return replace(exclusions, satellites=latch), Finding(
+        subject=SAT_IDS[satellite], cause=cause, value=value, threshold=threshold
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Standing:
+    """How what is excluded would do: masks of what was seen to pass, for :func:`gbas_ground.executive.advance`."""
+
+    channels: BoolArray
+    receivers: BoolArray
+    satellites: BoolArray
+
+
+def standing(
+    measured: Measured, made: Corrections, exclusions: Exclusions, channel_ok: BoolArray, params: GroundParams
+) -> Standing:
+    """Judge what is not used against the corrections it has no part in.
+
+    Parameters
+    ----------
+    measured, made, exclusions
+        As they are after :func:`agree`.
+    channel_ok : (R, N) bool array
+        Channels that are tracked and pass the monitors of single channels.
+    params : GroundParams
+
+    Notes
+    -----
+    A channel excluded by its B value has to be seen to agree. A channel excluded for another reason passes while its
+    own monitor does, unless it is seen to disagree: there may be nothing to compare it with, and its B value is tested
+    when it comes back.
+
+    When the exclusions leave a constellation without a clock, nothing can be compared with anything, and no exclusion
+    would ever end. Then everything is judged together as if nothing were excluded, and passes together or not at all.
+    """
+    unused = measured.settled & ~made.used
+    result = check_unused(_residual_m(measured, made, params), made.channel_sigma_m, made.count, params.k_b)
+    judged = unused & np.isfinite(result.statistic).all(axis=0) & (made.count > 0)
+    agrees, disagrees = judged & ~result.failed.any(axis=0), judged & result.failed.any(axis=0)
+    needs_comparison = exclusions.channels.cause == ExclusionCause.B_VALUE
+    channels = channel_ok & np.where(needs_comparison, agrees, ~disagrees)
+    receivers = (agrees.sum(axis=1) >= params.min_common_satellites) & ~disagrees.any(axis=1)
+
+    seen = (made.count > 0) & np.isfinite(made.rrc_mps).all(axis=0)
+    within = ~np.asarray(np.any([result.failed.any(axis=0) for _, result in limit_checks(made, params)], axis=0))
+    consistent = ~b_value_check(made, params).failed.any(axis=(0, 1))
+    by_b = exclusions.satellites.cause == ExclusionCause.B_VALUE
+    satellites = seen & within & consistent & (~by_b | (made.count >= 2))
+
+    together = _together(measured, made, channel_ok, params)
+    return Standing(
+        channels=channels | (channel_ok & together.channels),
+        receivers=receivers | (together.receivers & ~disagrees.any(axis=1)),
+        satellites=satellites | together.satellites,
+    )
+
+
+def _together(measured: Measured, made: Corrections, channel_ok: BoolArray, params: GroundParams) -> Standing:
+    """What passes in constellations without a clock when nothing is excluded there."""
+    channels, receivers = np.zeros_like(channel_ok), np.zeros(len(channel_ok), dtype=bool)
+    stuck = ~made.common.any(axis=1) & (channel_ok.any(axis=0) & CLOCK_GROUPS).any(axis=1)
+    if stuck.any():
+        trial = form_corrections(
+            replace(measured, settled=measured.settled & channel_ok), no_exclusions(params), params
+        )
+        failed: BoolArray = np.asarray(b_value_check(trial, params).failed.any(axis=(0, 1)))
+        for _, result in limit_checks(trial, params):
+            failed = failed | np.asarray(result.failed.any(axis=0))
+        for k, group in enumerate(CLOCK_GROUPS):
+            if stuck[k] and trial.common[k].any() and not (failed & group).any():
+                channels = channels | (trial.used & group)
+                receivers = receivers | trial.in_use[k]
+    return Standing(channels=channels, receivers=receivers, satellites=np.asarray(channels.any(axis=0)))
+
+
+def _residual_m(measured: Measured, made: Corrections, params: GroundParams) -> FloatArray:
+    """PR_sc less PRC, with each receiver's clock estimated against the PRC of the common satellites it has."""
+    against = measured.correction_m - made.prc_m[:, np.newaxis, :]
+    usable = measured.settled & np.isfinite(against).all(axis=0) & made.common.any(axis=0)
+    residual = np.full(against.shape, np.nan)
+    for group in CLOCK_GROUPS:
+        own = usable & group
+        number = own.sum(axis=1)
+        total = np.where(own, against, 0.0).sum(axis=-1)
+        clock = np.where(number >= params.min_common_satellites, total / np.maximum(number, 1), np.nan)
+        residual = np.where(group, against - clock[..., np.newaxis], residual)
+    return residual

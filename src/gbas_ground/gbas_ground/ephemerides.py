@@ -1,0 +1,98 @@
+"""Which ephemeris the station corrects with, and how it changes from one to the next."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+from gbas_core.ephemeris import Ephemeris, EphemerisStore
+from gbas_core.record import FloatArray
+from gbas_core.satellites import SAT_IDS, missing
+from gbas_ground.corrections import BoolArray
+from gbas_ground.monitors.ephemeris_change import check_ephemeris_change
+from gbas_ground.params import GroundParams
+from gbas_msgs_py.events import Event, EventKind
+from gbas_msgs_py.vdb.ephemeris_crc import ephemeris_crcs
+
+SOURCE = "ephemerides"
+# Two ephemerides of a satellite are the same when all of these are.
+_IDENTITY = ("message", "iod", "toe_week", "toe_tow_s", "toc_tow_s", "af0_s", "m0_rad", "sqrt_a", "cuc_rad")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class EphemerisState:
+    """Ephemerides received, the ones in use, and their CRCs ``(N,)``."""
+
+    store: EphemerisStore
+    current: Ephemeris
+    crc: FloatArray
+
+
+def initial_ephemerides() -> EphemerisState:
+    """Nothing received."""
+    return EphemerisState(store=EphemerisStore(), current=Ephemeris(gps_week=0, tow_s=0.0), crc=missing())
+
+
+def _only(ephemeris: Ephemeris, satellites: BoolArray) -> Ephemeris:
+    """The ephemerides of some satellites."""
+    masked: dict[str, Any] = {
+        item.name: np.where(satellites, value, np.nan)
+        for item in fields(ephemeris)
+        if isinstance(value := getattr(ephemeris, item.name), np.ndarray)
+    }
+    return replace(ephemeris, **masked)
+
+
+def receive(
+    state: EphemerisState, new: Ephemeris, gps_week: int, tow_s: float, params: GroundParams
+) -> tuple[EphemerisState, tuple[Event, ...]]:
+    """Store newly received ephemerides, but for those that do not continue the ones before."""
+    old = state.store.usable(gps_week, tow_s, 0.0)
+    check = check_ephemeris_change(new, old, gps_week, tow_s, params.ephemeris_max_change_m)
+    events = tuple(
+        Event(
+            gps_week=gps_week, tow_s=tow_s, kind=EventKind.INPUT, subject=SAT_IDS[satellite],
+            cause="ephemeris_change", value=check.at(satellite)[0], threshold=check.at(satellite)[1], source=SOURCE,
+        )
+        for satellite in map(int, np.flatnonzero(check.failed))
+    )  # fmt: skip
+    accepted = _only(new, ~check.failed) if events else new
+    return replace(state, store=state.store.add(accepted)), events
+
+
+def choose(
+    state: EphemerisState, gps_week: int, tow_s: float, params: GroundParams
+) -> tuple[EphemerisState, BoolArray, tuple[Event, ...]]:
+    """Ephemerides to use now.
+
+    Returns
+    -------
+    state : EphemerisState
+    changed : (N,) bool array
+        Satellites whose ephemeris is another than at the epoch before.
+    events : tuple of Event
+        The changes from one ephemeris to the next, with the new issue of data as value.
+    """
+    current = state.store.usable(gps_week, tow_s, params.ephemeris_settle_s)
+    before, now = _identity(state.current), _identity(current)
+    present, was_present = np.isfinite(now[0]), np.isfinite(before[0])
+    same = (before == now).all(axis=0)
+    changed = present & ~same
+    crc = np.where(present, state.crc, np.nan)
+    events: tuple[Event, ...] = ()
+    if changed.any():
+        crc = np.where(changed, ephemeris_crcs(_only(current, changed)), crc)
+        events = tuple(
+            Event(
+                gps_week=gps_week, tow_s=tow_s, kind=EventKind.STATION, subject=SAT_IDS[satellite],
+                cause="new_ephemeris", value=float(current.iod[satellite]), source=SOURCE,
+            )
+            for satellite in map(int, np.flatnonzero(changed & was_present))
+        )  # fmt: skip
+    return EphemerisState(store=state.store, current=current, crc=crc), changed, events
+
+
+def _identity(ephemeris: Ephemeris) -> FloatArray:
+    return np.stack([getattr(ephemeris, name) for name in _IDENTITY])

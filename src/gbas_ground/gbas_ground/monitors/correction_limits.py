@@ -1,0 +1,26 @@
+"""Size of the corrections: what the standard allows, and what the message can carry."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gbas_core.record import FloatArray
+from gbas_ground.corrections import BoolArray
+from gbas_ground.monitors.result import MonitorResult, upper_limit
+
+
+def check_correction(correction: FloatArray, applies: BoolArray, limit: float) -> MonitorResult:
+    """Fail satellites whose correction is larger than its limit.
+
+    Parameters
+    ----------
+    correction : (..., N) array
+        PRC [m] or RRC [m/s].
+    applies : (N,) bool array
+        Satellites that have corrections.
+    limit : float
+        In the correction's unit.
+
+    Source: 327.67 m, range of the type 1 message (ICAO Annex 10 vol. I, table B-63); 3.4 m/s, an early LAAS prototype.
+    """
+    return upper_limit(np.abs(correction), limit, np.broadcast_to(applies, correction.shape))

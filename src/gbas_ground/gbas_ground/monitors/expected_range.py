@@ -1,0 +1,49 @@
+"""Raw pseudoranges against what they should be: gross faults of a channel or an ephemeris."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gbas_core.record import FloatArray
+from gbas_ground.corrections import CLOCK_GROUPS, BoolArray
+from gbas_ground.monitors.result import MonitorResult, upper_limit
+
+
+def check_expected_range(raw_correction_m: FloatArray, tracked: BoolArray, limit_m: float) -> MonitorResult:
+    """Compare each raw pseudorange with the one the broadcast orbit and clock give at the known antenna.
+
+    Parameters
+    ----------
+    raw_correction_m : (R, N) array
+        Expected less measured pseudorange, with the receiver clock in it [m]: PR_sc of the unsmoothed range.
+    tracked : (R, N) bool array
+        Channels with a pseudorange and an ephemeris.
+    limit_m : float
+        Largest residual [m].
+
+    Returns
+    -------
+    MonitorResult
+        Statistic: size of the residual less the median of the receiver's satellites of the same constellation [m].
+
+    Notes
+    -----
+    The median estimates the receiver clock, so that a minority of gross errors does not shift it. What is left holds
+    the troposphere (25 m at 5 degrees) and the ionosphere (65 m in the storms of 2003); the limit has to pass both.
+    With one satellite of a constellation the residual is zero and with two a fault shows on both: the smallest common
+    set of the corrections is larger than that.
+    """
+    residual = np.full(raw_correction_m.shape, np.nan)
+    for group in CLOCK_GROUPS:
+        own = np.where(tracked & group, raw_correction_m, np.nan)
+        residual = np.where(group, own - _median(own), residual)
+    return upper_limit(np.abs(residual), limit_m, tracked)
+
+
+def _median(values: FloatArray) -> FloatArray:
+    """Median of the finite values of each row, as a column; NaN for a row without any."""
+    ordered = np.sort(values, axis=-1)  # NaN last
+    count = np.isfinite(values).sum(axis=-1, keepdims=True)
+    low, high = np.maximum(count - 1, 0) // 2, count // 2
+    pair = np.take_along_axis(ordered, np.concatenate([low, high], axis=-1), axis=-1)
+    return np.asarray(0.5 * (pair[..., :1] + pair[..., 1:]))

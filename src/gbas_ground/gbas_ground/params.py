@@ -1,0 +1,566 @@
+"""Parameters of a ground station: what it is, what it claims, and when it stops claiming it.
+
+:class:`GroundParams` is frozen and checked when it is made; every complaint names the field as it stands in a
+configuration file, its value and its bound. The same declaration serves the files (:func:`GroundParams.from_yaml`), the
+nodes' parameters and the documentation: each field says in which section it stands, its unit and its bounds.
+
+Where a parameter is part of the integrity claim, its default is the most conservative value the broadcast can carry, or
+the one that withholds service, so that leaving it out is never optimistic.
+
+Angles are degrees in files only.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import yaml
+
+from gbas_core.approach import FinalApproach
+from gbas_core.frames import ecef_from_geodetic
+from gbas_core.record import FloatArray
+from gbas_core.satellites import SYSTEM_MASKS
+from gbas_ground.approaches import approach_from_mapping, fas_data_set
+from gbas_msgs_py.records import MAX_REFERENCE_RECEIVERS
+from gbas_msgs_py.vdb.burst import SLOT_NAMES
+from gbas_msgs_py.vdb.errors import VdbError
+from gbas_msgs_py.vdb.messages import AdditionalBlock1, AdditionalBlock3, AdditionalBlock4, FasDataSet, Type2
+from gbas_msgs_py.vdb.schedule import ScheduleParams, sources_that_fit
+
+_KEY: Final = "gbas_parameter"
+_DEGREE: Final = math.pi / 180.0
+ROOT_KEY: Final = "ground"
+GCID_UNHEALTHY: Final = 7
+RSDS_NONE: Final = 255
+MIN_SERVICE_SATELLITES: Final = 4
+"""Fewer corrections than this give nobody a position: the station then says that it is not healthy."""
+
+
+class ParameterError(ValueError):
+    """A parameter that cannot be used: names the field, the value and the bound."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ParameterSpec:
+    """How one field of :class:`GroundParams` stands in a file, and its bounds in the file's unit."""
+
+    section: str
+    name: str
+    unit: str
+    doc: str
+    low: float | None = None
+    high: float | None = None
+    choices: tuple[Any, ...] = ()
+    per_unit: float = 1.0
+
+    @property
+    def key(self) -> str:
+        """Dotted name in a configuration file."""
+        return f"{self.section}.{self.name}"
+
+
+_REQUIRED: Final = object()
+
+
+def _parameter(section: str, name: str, default: Any, unit: str, doc: str, **limits: Any) -> Any:
+    """Declare a parameter; its default is in the file's unit."""
+    spec = ParameterSpec(section=section, name=name, unit=unit, doc=doc, **limits)
+    if default is _REQUIRED:
+        return field(metadata={_KEY: spec})
+    own = default * spec.per_unit if spec.per_unit != 1.0 and not isinstance(default, tuple) else default
+    return field(default=own, metadata={_KEY: spec})
+
+
+@dataclass(frozen=True, kw_only=True)
+class GroundParams:
+    """Everything a ground station has to be told. Units are SI; files use the units of their key names."""
+
+    # --- station: what the type 2 message says of the station
+    station_id: str = _parameter("station", "id", _REQUIRED, "-", "GBAS ID, 3 or 4 characters A-Z, 0-9")
+    latitude_rad: float = _parameter(
+        "station", "latitude_deg", _REQUIRED, "deg", "reference point", low=-90.0, high=90.0, per_unit=_DEGREE
+    )
+    longitude_rad: float = _parameter(
+        "station", "longitude_deg", _REQUIRED, "deg", "reference point", low=-180.0, high=180.0, per_unit=_DEGREE
+    )
+    height_m: float = _parameter(
+        "station", "height_m", _REQUIRED, "m", "reference point above the ellipsoid", low=-1000.0, high=20_000.0
+    )
+    magnetic_variation_rad: float = _parameter(
+        "station", "magnetic_variation_deg", 0.0, "deg", "positive east", low=-180.0, high=180.0, per_unit=_DEGREE
+    )
+    gcid: int = _parameter(
+        "station",
+        "gcid",
+        GCID_UNHEALTHY,
+        "-",
+        "continuity/integrity designator; 7 is unhealthy",
+        choices=(1, 2, 3, 4, 7),
+    )
+    rsds: int = _parameter(
+        "station", "rsds", RSDS_NONE, "-", "reference station data selector, 0-48; 255 no positioning service",
+        choices=(*range(49), RSDS_NONE),
+    )  # fmt: skip
+    max_use_distance_m: float = _parameter(
+        "station", "max_use_distance_m", 50_000.0, "m", "D_max; 0 is unlimited", low=0.0, high=510_000.0
+    )
+    systems: str = _parameter("station", "systems", "G", "-", "satellite systems corrected: G, E or GE")
+
+    # --- receivers
+    receiver_ecef_m: tuple[tuple[float, float, float], ...] = _parameter(
+        "receivers", "rr1_ecef_m", _REQUIRED, "m", "antenna positions of the 1 to 4 reference receivers (rr1, rr2, ...)"
+    )
+    min_receivers: int = _parameter(
+        "receivers", "minimum", 2, "-", "fewest receivers behind a broadcast correction", low=1, high=4
+    )
+
+    # --- accuracy
+    accuracy_designator: str = _parameter(
+        "accuracy", "designator", "A", "-", "ground accuracy designator", choices=("A", "B", "C")
+    )
+    sigma_elevation_rad: tuple[float, ...] = _parameter(
+        "accuracy", "sigma_elevation_deg", (), "deg", "nodes of a measured sigma table, rising; empty: the designator",
+        low=0.0, high=90.0, per_unit=_DEGREE,
+    )  # fmt: skip
+    sigma_table_m: tuple[float, ...] = _parameter(
+        "accuracy", "sigma_m", (), "m", "measured sigma of one receiver's 100 s correction at the nodes",
+        low=0.001, high=100.0,
+    )  # fmt: skip
+    sigma_inflation: float = _parameter(
+        "accuracy", "inflation", 1.0, "-", "factor on every sigma (tails, mean errors)", low=1.0, high=100.0
+    )
+    sigma_inflation_iono: float = _parameter(
+        "accuracy", "inflation_iono", 1.0, "-", "further factor on sigma_pr_gnd alone (anomalous ionosphere)",
+        low=1.0, high=100.0,
+    )  # fmt: skip
+    sigma_30_factor: float = _parameter(
+        "accuracy", "factor_30s", math.sqrt(100.0 / 30.0), "-", "sigma of the 30 s corrections over the 100 s ones",
+        low=1.0, high=10.0,
+    )  # fmt: skip
+
+    # --- atmosphere
+    sigma_vert_iono_gradient: float = _parameter(
+        "atmosphere", "sigma_vert_iono_gradient", 25.5e-6, "m/m", "for the type 2 message", low=0.0, high=25.5e-6
+    )
+    sigma_vert_iono_gradient_d: float = _parameter(
+        "atmosphere", "sigma_vert_iono_gradient_d", 25.5e-6, "m/m", "for additional data block 3", low=0.0, high=25.5e-6
+    )
+    refractivity: float = _parameter("atmosphere", "refractivity", 400.0, "N", "at the site", low=16.0, high=781.0)
+    refractivity_uncertainty: float = _parameter(
+        "atmosphere", "refractivity_uncertainty", 255.0, "N", "one sigma", low=0.0, high=255.0
+    )
+    scale_height_m: float = _parameter(
+        "atmosphere", "scale_height_m", 7900.0, "m", "of the troposphere", low=100.0, high=25_500.0
+    )
+
+    # --- ephemeris
+    p_ephemeris: float = _parameter(
+        "ephemeris", "p", 1.275e-3, "m/m", "decorrelation parameter of the type 1 message", low=0.0, high=1.275e-3
+    )
+    p_ephemeris_d: float = _parameter(
+        "ephemeris", "p_d", 1.275e-3, "m/m", "decorrelation parameter of the type 11 message", low=0.0, high=1.275e-3
+    )
+    k_md_e_pos: float = _parameter("ephemeris", "k_md_e_pos", 12.75, "-", "positioning service", low=0.0, high=12.75)
+    k_md_e_c: float = _parameter("ephemeris", "k_md_e_c", 12.75, "-", "service type C", low=0.0, high=12.75)
+    k_md_e_d: float = _parameter("ephemeris", "k_md_e_d", 12.75, "-", "service type D", low=0.0, high=12.75)
+    ephemeris_settle_s: float = _parameter(
+        "ephemeris",
+        "settle_s",
+        120.0,
+        "s",
+        "a new ephemeris is used this long after its reception",
+        low=0.0,
+        high=180.0,
+    )
+    ephemeris_max_change_m: float = _parameter(
+        "ephemeris", "max_change_m", 250.0, "m", "a new ephemeris further from the last one is not used",
+        low=1.0, high=100_000.0,
+    )  # fmt: skip
+
+    # --- service type D
+    gast_d: bool = _parameter("gast_d", "enabled", False, "-", "broadcast type 11 messages and additional data block 3")
+    y_eig_m: float = _parameter("gast_d", "y_eig_m", 3.0, "m", "ionospheric error at the station", low=0.0, high=3.0)
+    m_eig: float = _parameter("gast_d", "m_eig", 0.7e-3, "m/m", "its growth with distance", low=0.0, high=0.7e-3)
+
+    # --- vdb
+    slots: str = _parameter("vdb", "slots", "A", "-", "slots assigned, such as AB or ACEG")
+    authentication: bool = _parameter("vdb", "authentication", False, "-", "broadcast additional data block 4")
+    test: bool = _parameter("vdb", "test", False, "-", "mark every message as a test: no guidance from it")
+    period_frames: int = _parameter(
+        "vdb", "period_frames", 20, "-", "frames within which types 2 and 4 are sent", low=1, high=20
+    )
+    occupancy_min: float = _parameter(
+        "vdb", "occupancy_min", 0.95, "-", "filled part of a burst when authenticated", low=0.0, high=1.0
+    )
+
+    # --- smoothing
+    tau_s: tuple[float, float] = _parameter(
+        "smoothing", "tau_s", (100.0, 30.0), "s", "time constants of the two corrections; 0: no smoothing (tests only)",
+        low=0.0, high=1000.0,
+    )  # fmt: skip
+    settle_time_s: float = _parameter(
+        "smoothing",
+        "settle_time_s",
+        200.0,
+        "s",
+        "time a filter has to run before its output is used",
+        low=0.0,
+        high=3600.0,
+    )
+    max_gap_s: float = _parameter(
+        "smoothing", "max_gap_s", 3.5, "s", "longest gap in the data a filter survives", low=0.1, high=3600.0
+    )
+
+    # --- monitors
+    elevation_mask_rad: float = _parameter(
+        "monitors", "elevation_mask_deg", 5.0, "deg", "lowest elevation corrected", low=5.0, high=60.0, per_unit=_DEGREE
+    )
+    min_cn0_dbhz: float = _parameter(
+        "monitors", "min_cn0_dbhz", 30.0, "dB-Hz", "lowest C/N0 of a channel in use", low=0.0, high=60.0
+    )
+    require_cn0: bool = _parameter(
+        "monitors", "require_cn0", True, "-", "do not use a channel whose receiver gives no C/N0"
+    )
+    max_range_residual_m: float = _parameter(
+        "monitors",
+        "max_range_residual_m",
+        150.0,
+        "m",
+        "raw pseudorange against the expected one",
+        low=10.0,
+        high=10_000.0,
+    )
+    max_prc_m: float = _parameter("monitors", "max_prc_m", 327.67, "m", "limit of |PRC|", low=1.0, high=327.67)
+    max_rrc_mps: float = _parameter("monitors", "max_rrc_mps", 3.4, "m/s", "limit of |RRC|", low=0.01, high=32.767)
+    k_b: float = _parameter("monitors", "k_b", 5.5, "-", "multiplier of the B value threshold", low=1.0, high=20.0)
+    receiver_fault_channels: int = _parameter(
+        "monitors", "receiver_fault_channels", 3, "-", "channels failing by B values that make the receiver the fault",
+        low=1, high=68,
+    )  # fmt: skip
+    readmission_time_s: float = _parameter(
+        "monitors",
+        "readmission_time_s",
+        60.0,
+        "s",
+        "time without a failing monitor before use again",
+        low=0.0,
+        high=7200.0,
+    )
+    min_common_satellites: int = _parameter(
+        "monitors", "min_common_satellites", 3, "-", "fewest common satellites a constellation is corrected with",
+        low=1, high=36,
+    )  # fmt: skip
+    clock_weighting: str = _parameter(
+        "monitors",
+        "clock_weighting",
+        "plain",
+        "-",
+        "mean that removes a receiver's clock",
+        choices=("plain", "elevation"),
+    )
+
+    approaches: tuple[FinalApproach, ...] = ()
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            if _KEY in item.metadata:
+                _check(item.metadata[_KEY], getattr(self, item.name))
+        _check_station(self)
+        _check_receivers(self)
+        _check_sigma_table(self)
+        _check_vdb(self)
+        _check_messages(self)
+
+    @property
+    def n_receivers(self) -> int:
+        """Reference receivers the station has, working or not."""
+        return len(self.receiver_ecef_m)
+
+    def receiver_positions_m(self) -> FloatArray:
+        """Antenna positions of the reference receivers, ECEF, ``(R, 3)`` [m]."""
+        return np.array(self.receiver_ecef_m, dtype=np.float64)
+
+    def reference_point_m(self) -> FloatArray:
+        """Reference point of the station, ECEF, ``(3,)`` [m]."""
+        return ecef_from_geodetic(self.latitude_rad, self.longitude_rad, self.height_m)
+
+    def station_message(self, *, healthy: bool = True) -> Type2:
+        """Station data as broadcast; a station that is not healthy says so whatever its parameters."""
+        return Type2(
+            n_reference_receivers=self.n_receivers if self.n_receivers >= 2 else None,
+            ground_accuracy_designator=self.accuracy_designator,
+            gcid=self.gcid if healthy else GCID_UNHEALTHY,
+            magnetic_variation_rad=self.magnetic_variation_rad,
+            sigma_vert_iono_gradient=self.sigma_vert_iono_gradient,
+            refractivity_index=self.refractivity,
+            scale_height_m=self.scale_height_m,
+            refractivity_uncertainty=self.refractivity_uncertainty,
+            latitude_rad=self.latitude_rad,
+            longitude_rad=self.longitude_rad,
+            ellipsoid_height_m=self.height_m,
+            adb1=AdditionalBlock1(
+                reference_station_data_selector=None if self.rsds == RSDS_NONE else self.rsds,
+                d_max_m=self.max_use_distance_m or math.inf,
+                k_md_e_pos_gps=self.k_md_e_pos,
+                k_md_e_c_gps=self.k_md_e_c,
+            ),
+            adb3=self._service_d_block() if self.gast_d else None,
+            adb4=AdditionalBlock4(slot_group=sum(1 << slot for slot in self.schedule().slots))
+            if self.authentication
+            else None,
+        )
+
+    def _service_d_block(self) -> AdditionalBlock3:
+        return AdditionalBlock3(
+            k_md_e_d_gps=self.k_md_e_d,
+            sigma_vert_iono_gradient_d=self.sigma_vert_iono_gradient_d,
+            y_eig_m=self.y_eig_m,
+            m_eig=self.m_eig,
+        )
+
+    def approach_messages(self) -> tuple[FasDataSet, ...]:
+        """Approaches as broadcast."""
+        return tuple(fas_data_set(approach) for approach in self.approaches)
+
+    def schedule(self) -> ScheduleParams:
+        """Settings of the frame schedule."""
+        return ScheduleParams(
+            station_id=self.station_id,
+            slots=tuple(SLOT_NAMES.index(slot) for slot in self.slots),
+            gast_d=self.gast_d,
+            test=self.test,
+            period_frames=self.period_frames,
+            occupancy_min=self.occupancy_min,
+        )
+
+    @classmethod
+    def from_mapping(cls, mapping: Mapping[str, Any], *, source: str = "parameters") -> GroundParams:
+        """Parameters from nested sections or dotted keys.
+
+        Parameters
+        ----------
+        mapping : mapping
+            Sections of keys as in the configuration files; a section may also be flattened to ``section.key``.
+        source : str
+            Where the mapping came from, for messages.
+
+        Raises
+        ------
+        ParameterError
+            For a key that does not exist, a required one that is missing, and values out of bounds.
+        """
+        try:
+            return cls(**_arguments(mapping))
+        except ParameterError as error:
+            raise ParameterError(f"{source}: {error}") from None
+
+    @classmethod
+    def from_yaml(cls, path: str | Path) -> GroundParams:
+        """Parameters from a ROS parameter file or a plain one: the sections stand under the key ``ground``.
+
+        Raises
+        ------
+        ParameterError
+            As :meth:`from_mapping`, and when the file is missing, is not YAML, or has no ``ground`` key.
+        """
+        try:
+            document = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+        except (OSError, UnicodeDecodeError) as error:
+            raise ParameterError(f"{path}: cannot be read: {error}") from None
+        except yaml.YAMLError as error:
+            raise ParameterError(f"{path}: is not YAML: {error}") from None
+        return cls.from_mapping(ground_section(document, str(path)), source=str(path))
+
+
+def ground_section(document: Any, source: str) -> Mapping[str, Any]:
+    """The ``ground`` section of a parsed file, with or without the ROS wrapping (``/**: ros__parameters:``)."""
+    node = document
+    for key in ("/**", "ros__parameters", ROOT_KEY):
+        if isinstance(node, Mapping) and key in node:
+            node = node[key]
+    if not isinstance(node, Mapping) or (isinstance(document, Mapping) and node is document):
+        raise ParameterError(f"{source}: has no section '{ROOT_KEY}'")
+    return node
+
+
+def parameter_specs() -> tuple[tuple[str, ParameterSpec, Any], ...]:
+    """Field name, specification and default (``dataclasses.MISSING`` when required) of every declared parameter."""
+    return tuple(
+        (item.name, item.metadata[_KEY], item.default) for item in fields(GroundParams) if _KEY in item.metadata
+    )
+
+
+def _flatten(mapping: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    flat: dict[str, Any] = {}
+    for key, value in mapping.items():
+        if isinstance(value, Mapping):
+            flat.update(_flatten(value, f"{prefix}{key}."))
+        else:
+            flat[f"{prefix}{key}"] = value
+    return flat
+
+
+def _arguments(mapping: Mapping[str, Any]) -> dict[str, Any]:
+    """Keyword arguments of :class:`GroundParams` from a nested or flat mapping."""
+    flat = _flatten(mapping)
+    arguments: dict[str, Any] = {"approaches": _approaches(flat), "receiver_ecef_m": _receivers(flat)}
+    for item in fields(GroundParams):
+        if _KEY not in item.metadata or item.name in arguments:
+            continue
+        spec: ParameterSpec = item.metadata[_KEY]
+        if spec.key in flat:
+            arguments[item.name] = _from_file(spec, flat.pop(spec.key))
+        elif item.default is not field().default:
+            continue
+        else:
+            raise ParameterError(f"{spec.key} is missing ({spec.doc})")
+    if flat:
+        known = ", ".join(sorted(spec.key for _, spec, _ in parameter_specs()))
+        raise ParameterError(f"unknown key {sorted(flat)[0]!r}; known are {known}, approaches.<name>.*")
+    return arguments
+
+
+def _receivers(flat: dict[str, Any]) -> tuple[Any, ...]:
+    """Take ``receivers.rrN_ecef_m`` out of a flat mapping; they must be rr1, rr2, ... without a hole."""
+    positions: list[Any] = []
+    for number in range(1, MAX_REFERENCE_RECEIVERS + 1):
+        key = f"receivers.rr{number}_ecef_m"
+        if key not in flat:
+            break
+        value = flat.pop(key)
+        positions.append(tuple(value) if isinstance(value, Sequence) and not isinstance(value, str) else value)
+    if not positions:
+        raise ParameterError("receivers.rr1_ecef_m is missing: at least one reference receiver is needed")
+    return tuple(positions)
+
+
+def _approaches(flat: dict[str, Any]) -> tuple[FinalApproach, ...]:
+    """Take ``approaches.<name>.*`` out of a flat mapping, in the order of the names."""
+    by_name: dict[str, dict[str, Any]] = {}
+    for key in [key for key in flat if key.startswith("approaches.")]:
+        _, name, *rest = key.split(".")
+        by_name.setdefault(name, {})[".".join(rest)] = flat.pop(key)
+    approaches = []
+    for name in sorted(by_name):
+        try:
+            approaches.append(approach_from_mapping(by_name[name]))
+        except ValueError as error:
+            raise ParameterError(f"approaches.{name}: {error}") from None
+    return tuple(approaches)
+
+
+def _from_file(spec: ParameterSpec, value: Any) -> Any:
+    """A file's value in the field's unit; what is not a number is left for the check to refuse."""
+    if isinstance(value, (list, tuple)):
+        return tuple(_from_file(spec, each) for each in value)
+    if spec.per_unit != 1.0 and isinstance(value, (int, float)) and not isinstance(value, bool):
+        return float(value) * spec.per_unit
+    return value
+
+
+def _check(spec: ParameterSpec, value: Any) -> None:
+    """Refuse a value of the wrong kind or out of its bounds; the message speaks in the file's unit."""
+    if spec.choices:
+        if isinstance(value, bool) or value not in spec.choices:
+            raise ParameterError(f"{spec.key} = {value!r} is not one of {_shortened(spec.choices)}")
+    elif spec.low is not None and spec.high is not None:
+        for each in value if isinstance(value, tuple) else (value,):
+            if isinstance(each, bool) or not isinstance(each, (int, float)):
+                raise ParameterError(f"{spec.key} = {each!r} is not a number")
+            tolerance = 1e-12 * max(abs(spec.low), abs(spec.high))  # of the degrees' conversion
+            shown = each / spec.per_unit
+            if not spec.low - tolerance <= shown <= spec.high + tolerance:
+                raise ParameterError(f"{spec.key} = {shown:g} is not within {spec.low:g} to {spec.high:g} {spec.unit}")
+
+
+def _shortened(choices: tuple[Any, ...]) -> str:
+    if len(choices) > 10:
+        return f"{choices[0]} to {choices[-2]}, {choices[-1]}"
+    return ", ".join(repr(choice) for choice in choices)
+
+
+def _check_station(params: GroundParams) -> None:
+    if not isinstance(params.station_id, str) or not re.fullmatch(r"[A-Z0-9]{3,4}", params.station_id):
+        raise ParameterError(f"station.id = {params.station_id!r} is not 3 or 4 characters of A-Z, 0-9")
+    systems = params.systems
+    if (
+        not isinstance(systems, str)
+        or not systems
+        or len(set(systems)) != len(systems)
+        or set(systems) - set(SYSTEM_MASKS)
+    ):
+        raise ParameterError(f"station.systems = {systems!r} is not one of G, E, GE")
+    for key, value in (
+        ("gast_d.enabled", params.gast_d),
+        ("monitors.require_cn0", params.require_cn0),
+        ("vdb.authentication", params.authentication),
+        ("vdb.test", params.test),
+    ):
+        if not isinstance(value, bool):
+            raise ParameterError(f"{key} = {value!r} is not true or false")
+    for key, count in (
+        ("receivers.minimum", params.min_receivers),
+        ("monitors.receiver_fault_channels", params.receiver_fault_channels),
+        ("monitors.min_common_satellites", params.min_common_satellites),
+        ("vdb.period_frames", params.period_frames),
+    ):
+        if not isinstance(count, int):
+            raise ParameterError(f"{key} = {count!r} is not a whole number")
+
+
+MAX_DISTANCE_FROM_REFERENCE_M: Final = 10_000.0
+"""A reference receiver further from the reference point than this is a mistake in the configuration. Ours."""
+
+
+def _check_receivers(params: GroundParams) -> None:
+    positions = params.receiver_ecef_m
+    if not isinstance(positions, tuple) or not 1 <= len(positions) <= MAX_REFERENCE_RECEIVERS:
+        raise ParameterError(f"receivers: {len(positions)} are not within 1 to {MAX_REFERENCE_RECEIVERS}")
+    for number, position in enumerate(positions, start=1):
+        key = f"receivers.rr{number}_ecef_m"
+        numbers = isinstance(position, tuple) and all(type(each) in (int, float) for each in position)
+        if not numbers or len(position) != 3:
+            raise ParameterError(f"{key} = {position!r} is not three numbers")
+        distance = float(np.linalg.norm(np.array(position, dtype=np.float64) - params.reference_point_m()))
+        if not distance <= MAX_DISTANCE_FROM_REFERENCE_M:
+            raise ParameterError(
+                f"{key} lies {distance:.0f} m from the reference point, more than {MAX_DISTANCE_FROM_REFERENCE_M:.0f} m"
+            )
+    if params.min_receivers > len(positions):
+        raise ParameterError(
+            f"receivers.minimum = {params.min_receivers} is more than the {len(positions)} receivers there are"
+        )
+
+
+def _check_sigma_table(params: GroundParams) -> None:
+    nodes, sigmas = params.sigma_elevation_rad, params.sigma_table_m
+    if not isinstance(nodes, tuple) or not isinstance(sigmas, tuple) or len(nodes) != len(sigmas):
+        raise ParameterError("accuracy.sigma_elevation_deg and accuracy.sigma_m are not lists of one length")
+    if nodes and (np.diff(nodes) <= 0.0).any():
+        raise ParameterError("accuracy.sigma_elevation_deg does not rise")
+    if nodes and nodes[0] > params.elevation_mask_rad:
+        raise ParameterError("accuracy.sigma_elevation_deg starts above monitors.elevation_mask_deg")
+
+
+def _check_vdb(params: GroundParams) -> None:
+    slots = params.slots
+    if not isinstance(slots, str) or not re.fullmatch(r"[A-H]{1,8}", slots) or "".join(sorted(set(slots))) != slots:
+        raise ParameterError(f"vdb.slots = {slots!r} is not letters A to H, each once, in order")
+    if not isinstance(params.tau_s, tuple) or len(params.tau_s) != 2:
+        raise ParameterError(f"smoothing.tau_s = {params.tau_s!r} is not two numbers")
+
+
+def _check_messages(params: GroundParams) -> None:
+    """Station data and approaches must fit the messages, and the messages the slots."""
+    try:
+        room = sources_that_fit(params.station_message(), params.approach_messages(), params.schedule())
+    except (VdbError, ValueError) as error:
+        raise ParameterError(f"cannot be broadcast: {error}") from None
+    if room < MIN_SERVICE_SATELLITES:
+        raise ParameterError(f"vdb.slots = {params.slots!r} leaves room for {room} satellites; 4 are needed")

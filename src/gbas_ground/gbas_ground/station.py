@@ -1,0 +1,451 @@
+"""The ground station: reference receivers' observations in, integrity and bursts out, one epoch at a time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+
+from gbas_core.ephemeris import Ephemeris
+from gbas_core.gpstime import epoch_key
+from gbas_core.observations import ObservationEpoch
+from gbas_core.record import FloatArray
+from gbas_core.satellites import N_SATS, SAT_IDS, satellites_of
+from gbas_core.signals import L1, SPEED_OF_LIGHT_MPS
+from gbas_ground import ephemerides
+from gbas_ground.broadcast import BroadcastState, broadcast_frame, empty_integrity
+from gbas_ground.causes import ExclusionCause
+from gbas_ground.condition import Condition, conclude, integrity_of
+from gbas_ground.consistency import Corrections, Exclusions, Finding, Measured, agree, no_exclusions, standing
+from gbas_ground.corrections import BoolArray, range_correction_m
+from gbas_ground.ephemerides import EphemerisState, initial_ephemerides
+from gbas_ground.executive import advance, exclude, release
+from gbas_ground.geometry import Expected, Site, expected, site_of
+from gbas_ground.monitors.expected_range import check_expected_range
+from gbas_ground.monitors.result import MonitorResult
+from gbas_ground.monitors.signal_power import check_signal_power
+from gbas_ground.params import GroundParams
+from gbas_ground.tracking import RawEpoch, TrackGroup, Tracks, initial_tracking, stack, track
+from gbas_msgs_py.events import Event, EventKind
+from gbas_msgs_py.records import ChannelState, IntegrityEpoch
+from gbas_msgs_py.vdb.burst import Burst
+
+SOURCE: Final = "ground_station"
+RESTART_AFTER_REFUSED: Final = 10
+"""Epochs refused, each later than the one before, after which the station believes them and starts anew. Ours."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class GroundEpoch:
+    """Everything that arrived for one epoch.
+
+    Attributes
+    ----------
+    gps_week, tow_s
+        The epoch.
+    observations : tuple of ObservationEpoch or None
+        One place a reference receiver; None where nothing arrived.
+    ephemerides : tuple of Ephemeris
+        Received since the epoch before.
+    """
+
+    gps_week: int
+    tow_s: float
+    observations: tuple[ObservationEpoch | None, ...]
+    ephemerides: tuple[Ephemeris, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Before:
+    """What the range rate corrections and the slip tests need of the epoch before.
+
+    Attributes
+    ----------
+    gps_week, tow_s
+    code_m : (R, N) array
+        Raw pseudoranges.
+    smoothed_m : (tau, R, N) array
+    correction_m : (tau, R, N) array
+        PR_sc.
+    """
+
+    gps_week: int
+    tow_s: float
+    code_m: FloatArray
+    smoothed_m: FloatArray
+    correction_m: FloatArray
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MonitorState:
+    """What the station remembers between epochs; from :func:`initial_monitor_state`.
+
+    Attributes
+    ----------
+    key : int or None
+        Last epoch processed [ms since the start of GPS time].
+    refused, refused_key : int
+        Epochs refused in a row, and the last of them.
+    ephemerides : EphemerisState
+    tracking : tuple of TrackGroup
+    exclusions : Exclusions
+    before : Before or None
+    satellites : (N,) array
+        :class:`ChannelState` of each satellite at the last epoch.
+    causes : (N,) array
+        :class:`ExclusionCause` at the last epoch.
+    present : (R,) bool array
+        Receivers that delivered the last epoch.
+    serving : bool
+        Whether there were corrections at the last epoch.
+    """
+
+    key: int | None
+    refused: int
+    refused_key: int
+    ephemerides: EphemerisState
+    tracking: tuple[TrackGroup, ...]
+    exclusions: Exclusions
+    before: Before | None
+    satellites: FloatArray
+    causes: FloatArray
+    present: BoolArray
+    serving: bool
+
+
+def initial_monitor_state(params: GroundParams) -> MonitorState:
+    """A station that has seen nothing."""
+    return MonitorState(
+        key=None,
+        refused=0,
+        refused_key=0,
+        ephemerides=initial_ephemerides(),
+        tracking=initial_tracking(params),
+        exclusions=no_exclusions(params),
+        before=None,
+        satellites=np.full(N_SATS, float(ChannelState.NOT_TRACKED)),
+        causes=np.zeros(N_SATS),
+        present=np.ones(params.n_receivers, dtype=bool),
+        serving=False,
+    )
+
+
+def initial_broadcast_state(params: GroundParams) -> BroadcastState:
+    """A broadcast that has sent nothing."""
+    return BroadcastState()
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StationState:
+    """State of the whole station."""
+
+    monitor: MonitorState
+    broadcast: BroadcastState
+
+
+def initial_state(params: GroundParams) -> StationState:
+    """A station that has just been switched on."""
+    return StationState(monitor=initial_monitor_state(params), broadcast=initial_broadcast_state(params))
+
+
+@lru_cache(maxsize=8)
+def _constants(params: GroundParams) -> tuple[Site, BoolArray]:
+    return site_of(params), satellites_of(params.systems)
+
+
+class GroundStation:
+    """The station's steps; it holds nothing itself. Nodes, the offline command and studies all use these."""
+
+    @staticmethod
+    def monitor(
+        state: MonitorState, epoch: GroundEpoch, params: GroundParams
+    ) -> tuple[MonitorState, IntegrityEpoch, tuple[Event, ...]]:
+        """Corrections of one epoch after monitoring.
+
+        Parameters
+        ----------
+        state : MonitorState
+        epoch : GroundEpoch
+            One place in `observations` for each reference receiver of `params`. An epoch not later than the last one is
+            refused with an event.
+        params : GroundParams
+
+        Returns
+        -------
+        state : MonitorState
+        integrity : IntegrityEpoch
+            Of the same epoch, whatever happened.
+        events : tuple of Event
+
+        Raises
+        ------
+        ValueError
+            When the number of observations is not the number of receivers.
+        """
+        if len(epoch.observations) != params.n_receivers:
+            raise ValueError(f"{len(epoch.observations)} observations for {params.n_receivers} reference receivers")
+        events = _Events(epoch)
+        admitted = _admit(state, epoch, params, events)
+        if admitted is None:
+            refused = replace(state, refused=_refused(state, epoch), refused_key=epoch_key(epoch.gps_week, epoch.tow_s))
+            return refused, empty_integrity(epoch.gps_week, epoch.tow_s), events.all()
+        new, integrity = _process(admitted, epoch, params, events)
+        return new, integrity, events.all()
+
+    @staticmethod
+    def broadcast(
+        state: BroadcastState, integrity: IntegrityEpoch, params: GroundParams
+    ) -> tuple[BroadcastState, tuple[Burst, ...]]:
+        """Bursts of the frame at the integrity's epoch; see :func:`gbas_ground.broadcast.broadcast_frame`."""
+        return broadcast_frame(state, integrity, params)
+
+    @staticmethod
+    def step(
+        state: StationState, epoch: GroundEpoch, params: GroundParams
+    ) -> tuple[StationState, IntegrityEpoch, tuple[Burst, ...], tuple[Event, ...]]:
+        """Both together."""
+        monitor, integrity, events = GroundStation.monitor(state.monitor, epoch, params)
+        broadcast, bursts = GroundStation.broadcast(state.broadcast, integrity, params)
+        return StationState(monitor=monitor, broadcast=broadcast), integrity, bursts, events
+
+
+class _Events:
+    """Events of one epoch, collected."""
+
+    def __init__(self, epoch: GroundEpoch) -> None:
+        self._gps_week, self._tow_s = epoch.gps_week, epoch.tow_s
+        self._list: list[Event] = []
+
+    def add(self, kind: EventKind, subject: str, cause: str, value: float = np.nan, threshold: float = np.nan) -> None:
+        self._list.append(
+            Event(
+                gps_week=self._gps_week, tow_s=self._tow_s, kind=kind, subject=subject, cause=cause,
+                value=float(value), threshold=float(threshold), source=SOURCE,
+            )
+        )  # fmt: skip
+
+    def extend(self, events: tuple[Event, ...]) -> None:
+        self._list.extend(events)
+
+    def found(self, findings: tuple[Finding, ...]) -> None:
+        for each in findings:
+            self.add(EventKind.EXCLUSION, each.subject, each.cause.word, each.value, each.threshold)
+
+    def all(self) -> tuple[Event, ...]:
+        return tuple(self._list)
+
+
+def _refused(state: MonitorState, epoch: GroundEpoch) -> int:
+    """Refused epochs in a row, of which each is later than the one before."""
+    later = state.refused > 0 and epoch_key(epoch.gps_week, epoch.tow_s) > state.refused_key
+    return state.refused + 1 if later else 1
+
+
+def _admit(state: MonitorState, epoch: GroundEpoch, params: GroundParams, events: _Events) -> MonitorState | None:
+    """The state to continue from; None refuses the epoch."""
+    key = epoch_key(epoch.gps_week, epoch.tow_s)
+    if state.key is None or key > state.key:
+        return replace(state, refused=0)
+    if _refused(state, epoch) >= RESTART_AFTER_REFUSED:
+        events.add(EventKind.STATION, "station", "restarted", (key - state.key) / 1000.0)
+        return initial_monitor_state(params)
+    events.add(EventKind.INPUT, "station", "epoch_not_later", (key - state.key) / 1000.0, 0.0)
+    return None
+
+
+def _process(
+    state: MonitorState, epoch: GroundEpoch, params: GroundParams, events: _Events
+) -> tuple[MonitorState, IntegrityEpoch]:
+    key = epoch_key(epoch.gps_week, epoch.tow_s)
+    dt_s = float("nan") if state.key is None else (key - state.key) / 1000.0
+    site, satellites = _constants(params)
+    known, changed = _ephemerides(state, epoch, params, events)
+    raw = stack(_of_this_epoch(epoch, events), satellites)
+    _receiver_events(state, raw, events)
+    exclusions = _released(state.exclusions, params, events)
+
+    should = expected(known.current, epoch.gps_week, epoch.tow_s, raw.code_m[:, L1], site)
+    tracked = np.isfinite(raw.code_m[:, L1] + raw.carrier_m[:, L1])
+    checks = _channel_checks(raw, should, tracked, params)
+    new_exclusions = _exclude_channels(exclusions, checks, events)
+    clean = _without(raw, checks[0][1].failed)
+    tracking, tracks = track(state.tracking, clean, key, _comparable_range_m(should, changed), params)
+
+    correction = range_correction_m(should.range_m, tracks.smoothed_m, should.clock_s)
+    measured = Measured(
+        correction_m=correction,
+        previous_m=_previous_corrections(state.before, known.current, changed, correction.shape, site),
+        dt_s=dt_s,
+        settled=_settled(tracks, correction, should, params),
+        elevation_rad=should.elevation_rad,
+    )
+    made, new_exclusions, findings = agree(measured, new_exclusions, params)
+    events.found(findings)
+    channel_ok = tracked & ~np.any([check.failed for _, check in checks], axis=0)
+    new_exclusions = _advanced(new_exclusions, measured, made, channel_ok, dt_s, params)
+
+    condition = conclude(tracked, tracks, measured, made, new_exclusions, params)
+    integrity = integrity_of(epoch.gps_week, epoch.tow_s, known, measured, made, condition)
+    serving = bool((condition.state == ChannelState.USABLE).any())
+    _satellite_events(state, condition, serving, findings, events)
+    before = Before(
+        gps_week=epoch.gps_week,
+        tow_s=epoch.tow_s,
+        code_m=clean.code_m[:, L1],
+        smoothed_m=tracks.smoothed_m,
+        correction_m=correction,
+    )
+    new = MonitorState(
+        key=key,
+        refused=0,
+        refused_key=0,
+        ephemerides=known,
+        tracking=tracking,
+        exclusions=new_exclusions,
+        before=before,
+        satellites=condition.state,
+        causes=condition.cause,
+        present=raw.present,
+        serving=serving,
+    )
+    return new, integrity
+
+
+def _ephemerides(
+    state: MonitorState, epoch: GroundEpoch, params: GroundParams, events: _Events
+) -> tuple[EphemerisState, BoolArray]:
+    known = state.ephemerides
+    for received in epoch.ephemerides:
+        known, refused = ephemerides.receive(known, received, epoch.gps_week, epoch.tow_s, params)
+        events.extend(refused)
+    known, changed, changes = ephemerides.choose(known, epoch.gps_week, epoch.tow_s, params)
+    events.extend(changes)
+    return known, changed
+
+
+def _of_this_epoch(epoch: GroundEpoch, events: _Events) -> tuple[ObservationEpoch | None, ...]:
+    """The observations; one that carries another epoch does not count."""
+    key = epoch_key(epoch.gps_week, epoch.tow_s)
+    result: list[ObservationEpoch | None] = []
+    for row, each in enumerate(epoch.observations):
+        if each is not None and epoch_key(each.gps_week, each.tow_s) != key:
+            late_s = (epoch_key(each.gps_week, each.tow_s) - key) / 1000.0
+            events.add(EventKind.INPUT, f"rr{row + 1}", "wrong_epoch", late_s, 0.0)
+            result.append(None)
+        else:
+            result.append(each)
+    return tuple(result)
+
+
+def _receiver_events(state: MonitorState, raw: RawEpoch, events: _Events) -> None:
+    for row in np.flatnonzero(raw.present != state.present):
+        events.add(EventKind.INPUT, f"rr{row + 1}", "back" if raw.present[row] else "missing")
+
+
+def _released(exclusions: Exclusions, params: GroundParams, events: _Events) -> Exclusions:
+    """End what has been clear for the re-admission time."""
+    channels, channels_ended = release(exclusions.channels, params.readmission_time_s)
+    receivers, receivers_ended = release(exclusions.receivers, params.readmission_time_s)
+    satellites, _ = release(exclusions.satellites, params.readmission_time_s)  # told when they are usable again
+    for row in np.flatnonzero(receivers_ended):
+        cause = ExclusionCause(int(exclusions.receivers.cause[row]))
+        events.add(EventKind.READMISSION, f"rr{row + 1}", cause.word, params.readmission_time_s)
+    for row, satellite in np.argwhere(channels_ended):
+        cause = ExclusionCause(int(exclusions.channels.cause[row, satellite]))
+        events.add(EventKind.READMISSION, f"rr{row + 1}/{SAT_IDS[satellite]}", cause.word, params.readmission_time_s)
+    return Exclusions(channels=channels, receivers=receivers, satellites=satellites)
+
+
+_Checks = tuple[tuple[ExclusionCause, MonitorResult], ...]
+
+
+def _channel_checks(raw: RawEpoch, should: Expected, tracked: BoolArray, params: GroundParams) -> _Checks:
+    """Monitors of single channels, each ``(R, N)``; the first also keeps measurements out of the filters."""
+    raw_correction = range_correction_m(should.range_m, raw.code_m[:, L1], should.clock_s)
+    predicted = tracked & np.isfinite(should.clock_s)
+    residual = check_expected_range(raw_correction, predicted, params.max_range_residual_m)
+    power = check_signal_power(raw.cn0_dbhz[:, L1], tracked, params.min_cn0_dbhz, required=params.require_cn0)
+    return ((ExclusionCause.RANGE_RESIDUAL, residual), (ExclusionCause.SIGNAL_POWER, power))
+
+
+def _exclude_channels(exclusions: Exclusions, checks: _Checks, events: _Events) -> Exclusions:
+    channels = exclusions.channels
+    for cause, check in checks:
+        for row, satellite in np.argwhere(check.failed & ~channels.excluded):
+            value, threshold = check.at(row, satellite)
+            events.add(EventKind.EXCLUSION, f"rr{row + 1}/{SAT_IDS[satellite]}", cause.word, value, threshold)
+        channels = exclude(channels, check.failed, cause)
+    return replace(exclusions, channels=channels)
+
+
+def _without(raw: RawEpoch, failed: BoolArray) -> RawEpoch:
+    """Raw observations without those that must not enter a filter."""
+    if not failed.any():
+        return raw
+    return raw._replace(code_m=np.where(failed[:, np.newaxis, :], np.nan, raw.code_m))
+
+
+def _comparable_range_m(should: Expected, changed: BoolArray) -> FloatArray:
+    """Expected ranges for the slip tests, missing where another ephemeris would look like a slip."""
+    range_m = should.range_m - SPEED_OF_LIGHT_MPS * should.clock_s
+    return np.where(changed, np.nan, range_m)
+
+
+def _previous_corrections(
+    before: Before | None, current: Ephemeris, changed: BoolArray, shape: tuple[int, ...], site: Site
+) -> FloatArray:
+    """PR_sc of the epoch before, as today's ephemerides would have made it."""
+    if before is None:
+        return np.full(shape, np.nan)
+    if not changed.any():
+        return before.correction_m
+    should = expected(current, before.gps_week, before.tow_s, before.code_m, site)
+    again = range_correction_m(should.range_m, before.smoothed_m, should.clock_s)
+    return np.where(changed, again, before.correction_m)
+
+
+def _settled(tracks: Tracks, correction_m: FloatArray, should: Expected, params: GroundParams) -> BoolArray:
+    """Channels whose filters have run long enough, of satellites above the mask, ``(R, N)``."""
+    high = should.elevation_rad >= params.elevation_mask_rad
+    return np.isfinite(correction_m).all(axis=0) & (tracks.age_s >= params.settle_time_s) & high
+
+
+def _advanced(
+    exclusions: Exclusions,
+    measured: Measured,
+    made: Corrections,
+    channel_ok: BoolArray,
+    dt_s: float,
+    params: GroundParams,
+) -> Exclusions:
+    """Count the clear time of everything that is excluded."""
+    latches = (exclusions.channels, exclusions.receivers, exclusions.satellites)
+    if not any(latch.excluded.any() for latch in latches):
+        return exclusions
+    passed = standing(measured, made, exclusions, channel_ok, params)
+    return Exclusions(
+        channels=advance(exclusions.channels, passed.channels, dt_s, params.max_gap_s),
+        receivers=advance(exclusions.receivers, passed.receivers, dt_s, params.max_gap_s),
+        satellites=advance(exclusions.satellites, passed.satellites, dt_s, params.max_gap_s),
+    )
+
+
+def _satellite_events(
+    state: MonitorState, condition: Condition, serving: bool, findings: tuple[Finding, ...], events: _Events
+) -> None:
+    """Satellites that came into use or went out of it, and the station with the first and the last of them."""
+    now, was = condition.state == ChannelState.USABLE, state.satellites == ChannelState.USABLE
+    told = {finding.subject for finding in findings}
+    for satellite in np.flatnonzero(now != was):
+        subject = SAT_IDS[satellite]
+        if now[satellite]:
+            cause = ExclusionCause(int(state.causes[satellite]))
+            events.add(EventKind.READMISSION, subject, cause.word)
+        elif subject not in told:
+            events.add(EventKind.EXCLUSION, subject, ExclusionCause(int(condition.cause[satellite])).word)
+    if serving != state.serving:
+        events.add(
+            EventKind.STATION, "station", "corrections_begin" if serving else "corrections_end", float(now.sum())
+        )
