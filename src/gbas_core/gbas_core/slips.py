@@ -353,8 +353,8 @@ def _without_motion(surprise_m: FloatArray, los: FloatArray, limit_m: float) -> 
     """Surprises (N_BANDS, N_SATS) of one receiver less the motion and clock that explain most of them.
 
     Satellites that disagree are left out of the fit one after the other, the worst first; a surprise that takes part is
-    scaled up for its pull on the fit. None if there are too few satellites to tell motion from slips; infinite surprises
-    if there are too few left that agree.
+    scaled up for its pull on the fit. None if there are too few satellites to tell motion from slips; infinite
+    surprises if there are too few left that agree.
     """
     rows = np.isfinite(surprise_m) & np.isfinite(los).all(axis=0)
     satellite = np.nonzero(rows)[1]
