@@ -67,6 +67,8 @@ VALIDITY_S: Final[FloatArray] = np.where(IS_GPS, 2 * 3600.0, 4 * 3600.0)
 Source: GPS, half of the fit interval of 4 h (IS-GPS-200N 20.3.4.4); Galileo, 4 h (OS Service Definition Document).
 """
 STORE_DEPTH: Final = 4
+VDB_IOD_MODULUS: Final = 256
+"""The VDB has eight bits for an issue of data (Annex 10 vol. I, B.3.6.4.2: IOD)."""
 
 FIELDS: Final[tuple[str, ...]] = tuple(item.name for item, spec in columns_of(Ephemeris) if spec.satellite)
 """Names of the per-satellite fields of :class:`Ephemeris`, in order."""
@@ -109,7 +111,10 @@ class EphemerisStore:
     values: FloatArray = field(default_factory=lambda: missing(STORE_DEPTH, _N_ROWS))
 
     def add(self, ephemeris: Ephemeris) -> EphemerisStore:
-        """Store with the ephemerides of one reception added; one that is stored already changes nothing."""
+        """Store with the ephemerides of one reception added; one that is stored already changes nothing.
+
+        To be added in order of reception and as time goes on: of each satellite only the last STORE_DEPTH are kept.
+        """
         new = np.full((_N_ROWS, N_SATS), np.nan)
         for row, name in enumerate(FIELDS):
             new[row] = getattr(ephemeris, name)
@@ -149,9 +154,13 @@ class EphemerisStore:
         return self._pick(gps_week, tow_s, age, age >= settle_s)
 
     def matching(self, iod: FloatArray, gps_week: int, tow_s: float) -> Ephemeris:
-        """The ephemeris of each satellite with the given issue of data ``(N_SATS,)``; missing as in :meth:`usable`."""
+        """The ephemeris of each satellite with the given issue of data ``(N_SATS,)``; missing as in :meth:`usable`.
+
+        The issue of data is compared as the VDB carries it: eight bits, the lower ones of Galileo's IODnav.
+        """
         age = self._age_s(gps_week, tow_s)
-        return self._pick(gps_week, tow_s, age, (age >= 0.0) & (self.values[:, _ROW["iod"]] == iod))
+        same = np.mod(self.values[:, _ROW["iod"]], VDB_IOD_MODULUS) == np.mod(iod, VDB_IOD_MODULUS)
+        return self._pick(gps_week, tow_s, age, (age >= 0.0) & same)
 
     def _age_s(self, gps_week: int, tow_s: float) -> FloatArray:
         weeks = gps_week - self.values[:, _RECEIVED_WEEK]
