@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -16,6 +16,7 @@ import yaml
 
 from gbas_core.satellites import SYSTEM_MASKS
 from gbas_core.slips import NORMAL_MANOEUVRE_JERK_MPS3
+from gbas_msgs_py.parameters import ParameterError, field_types, parameters_from, require
 from gbas_msgs_py.vdb.burst import SLOT_NAMES
 
 NO_FAS: Final = -1
@@ -149,21 +150,26 @@ class AirborneParams:
 
         Raises
         ------
-        ValueError
+        ParameterError
             Naming the field, its value and the bound it breaks.
         """
-        for item in fields(self):
-            _check_type(item.name, getattr(self, item.name), type(item.default))
+        for name, kind in field_types(AirborneParams).items():
+            value = getattr(self, name)
+            good = type(value) is kind or (kind is float and type(value) is int)
+            require(name, value, good, f"a {kind.__name__}")
         for name, (lower, upper) in _BOUNDS.items():
-            _check_bounds(name, getattr(self, name), lower, upper)
-        _check_choice("service", self.service, ("C",))
-        _check_choice("aad", self.aad, ("A", "B"))
-        _check_letters("systems", self.systems, "".join(SYSTEM_MASKS), empty=False)
-        _check_letters("slot_group", self.slot_group, SLOT_NAMES, empty=True)
-        if len(self.station_id) > 4:
-            raise ValueError(f"airborne parameter station_id={self.station_id!r} has more than 4 characters")
-        if self.slot_group and not self.authentication:
-            raise ValueError(f"airborne parameter slot_group={self.slot_group!r} needs authentication: true")
+            value = getattr(self, name)
+            require(name, value, math.isfinite(value) and lower <= value <= upper, f"{lower:g} to {upper:g}")
+        require("service", self.service, self.service == "C", "C")
+        require("aad", self.aad, self.aad in ("A", "B"), "A or B")
+        require(
+            "systems", self.systems, _distinct(self.systems, "".join(SYSTEM_MASKS)) and bool(self.systems), "G, E or GE"
+        )
+        require("slot_group", self.slot_group, _distinct(self.slot_group, SLOT_NAMES), "distinct letters A to H")
+        require(
+            "slot_group", self.slot_group, self.authentication or not self.slot_group, "none without authentication"
+        )
+        require("station_id", self.station_id, len(self.station_id) <= 4, "at most 4 characters")
 
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any]) -> AirborneParams:
@@ -171,19 +177,10 @@ class AirborneParams:
 
         Raises
         ------
-        ValueError
+        ParameterError
             For a name that is not a parameter, or a value out of bounds.
         """
-        defaults = {item.name: item.default for item in fields(cls)}
-        for name in mapping:
-            if name not in defaults:
-                raise ValueError(f"airborne parameter {name!r} is unknown; known are {', '.join(defaults)}")
-        # An integer in a file is a fair way to write a float.
-        values: dict[str, Any] = {
-            name: float(value) if isinstance(defaults[name], float) and type(value) is int else value
-            for name, value in mapping.items()
-        }
-        return cls(**values)
+        return parameters_from(cls, mapping)
 
     @classmethod
     def from_yaml(cls, path: str | Path) -> AirborneParams:
@@ -191,46 +188,26 @@ class AirborneParams:
 
         Raises
         ------
-        ValueError
+        ParameterError
             Naming the file and what is wrong in it.
         """
         try:
             document = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
             return cls.from_mapping(_section(document))
         except (OSError, UnicodeDecodeError, yaml.YAMLError, ValueError) as error:
-            raise ValueError(f"{path}: {error}") from error
+            raise ParameterError(f"{path}: {error}") from error
 
 
 def _section(document: Any) -> Mapping[str, Any]:
-    for keys in (("/**", "ros__parameters"), ("airborne",)):
-        for key in keys:
-            if isinstance(document, Mapping) and key in document:
-                document = document[key]
+    for key in ("/**", "ros__parameters", "airborne"):
+        if isinstance(document, Mapping) and key in document:
+            document = document[key]
     if document is None:
         return {}
     if not isinstance(document, Mapping):
-        raise ValueError(f"airborne parameters are names and values, this is {type(document).__name__}")
+        raise ParameterError(f"airborne parameters are names and values, not {document!r:.40}")
     return document
 
 
-def _check_type(name: str, value: object, expected: type) -> None:
-    good = isinstance(value, expected) and (expected is bool or not isinstance(value, bool))
-    if expected is float and type(value) is int:
-        good = True
-    if not good:
-        raise ValueError(f"airborne parameter {name}={value!r} must be of type {expected.__name__}")
-
-
-def _check_bounds(name: str, value: float, lower: float, upper: float) -> None:
-    if not (math.isfinite(value) and lower <= value <= upper):
-        raise ValueError(f"airborne parameter {name}={value!r} is not within {lower:g} to {upper:g}")
-
-
-def _check_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
-    if value not in choices:
-        raise ValueError(f"airborne parameter {name}={value!r} is not one of {', '.join(choices)}")
-
-
-def _check_letters(name: str, value: str, letters: str, *, empty: bool) -> None:
-    if (not value and not empty) or set(value) - set(letters) or len(set(value)) != len(value):
-        raise ValueError(f"airborne parameter {name}={value!r} must be made of distinct letters of {letters}")
+def _distinct(value: str, letters: str) -> bool:
+    return len(set(value)) == len(value) and not set(value) - set(letters)
