@@ -96,7 +96,7 @@ def broadcast_frame(
     frame = Frame(
         gps_week=integrity.gps_week,
         tow_s=integrity.tow_s,
-        sources=tuple(_source(integrity, satellite, params) for satellite in satellites),
+        sources=_sources(integrity, satellites, params),
         station=healthy if serves else unhealthy,
         approaches=approaches,
     )
@@ -113,28 +113,44 @@ def _highest(usable: BoolArray, elevation_rad: FloatArray, room: int) -> tuple[i
     return tuple(satellites.tolist())
 
 
-def _source(integrity: IntegrityEpoch, satellite: int, params: GroundParams) -> SourceCorrection:
-    number = int(RANGING_SOURCE_ID[satellite])
-    b1, b2, b3, b4 = (float(value) for value in integrity.b_m[:, satellite])
-    correction = Correction100(
-        ranging_source_id=number,
-        iod=int(integrity.iod[satellite]) % _IOD_MODULUS,
-        prc_m=float(integrity.prc_100_m[satellite]),
-        rrc_mps=float(integrity.rrc_100_mps[satellite]),
-        sigma_pr_gnd_m=float(integrity.sigma_pr_gnd_m[satellite]),
-        b_values_m=(b1, b2, b3, b4),
+def _sources(
+    integrity: IntegrityEpoch, satellites: tuple[int, ...], params: GroundParams
+) -> tuple[SourceCorrection, ...]:
+    """All there is to send of the satellites."""
+    chosen = list(satellites)
+    columns = [
+        getattr(integrity, name)[chosen].tolist()
+        for name in ("iod", "ephemeris_crc", "prc_100_m", "rrc_100_mps", "sigma_pr_gnd_m")
+    ]
+    b_values = integrity.b_m[:, chosen].T.tolist()
+    thirty = _corrections_30(integrity, chosen) if params.gast_d else [None] * len(chosen)
+    return tuple(
+        SourceCorrection(
+            correction=Correction100(
+                ranging_source_id=number,
+                iod=int(iod) % _IOD_MODULUS,
+                prc_m=prc,
+                rrc_mps=rrc,
+                sigma_pr_gnd_m=sigma,
+                b_values_m=tuple(b),
+            ),
+            correction_30=correction_30,
+            ephemeris_crc=int(crc),
+            ephemeris_decorrelation=params.p_ephemeris,
+            ephemeris_decorrelation_d=params.p_ephemeris_d,
+        )
+        for number, iod, crc, prc, rrc, sigma, b, correction_30 in zip(
+            RANGING_SOURCE_ID[chosen].tolist(), *columns, b_values, thirty, strict=True
+        )
     )
-    correction_30 = Correction30(
-        ranging_source_id=number,
-        prc_30_m=float(integrity.prc_30_m[satellite]),
-        rrc_30_mps=float(integrity.rrc_30_mps[satellite]),
-        sigma_pr_gnd_d_m=float(integrity.sigma_pr_gnd_d_m[satellite]),
-        sigma_pr_gnd_30_m=float(integrity.sigma_pr_gnd_30_m[satellite]),
-    )
-    return SourceCorrection(
-        correction=correction,
-        correction_30=correction_30 if params.gast_d else None,
-        ephemeris_crc=int(integrity.ephemeris_crc[satellite]),
-        ephemeris_decorrelation=params.p_ephemeris,
-        ephemeris_decorrelation_d=params.p_ephemeris_d,
-    )
+
+
+def _corrections_30(integrity: IntegrityEpoch, chosen: list[int]) -> list[Correction30]:
+    names = ("prc_30_m", "rrc_30_mps", "sigma_pr_gnd_d_m", "sigma_pr_gnd_30_m")
+    columns = [getattr(integrity, name)[chosen].tolist() for name in names]
+    return [
+        Correction30(
+            ranging_source_id=number, prc_30_m=prc, rrc_30_mps=rrc, sigma_pr_gnd_d_m=sigma_d, sigma_pr_gnd_30_m=sigma_30
+        )
+        for number, prc, rrc, sigma_d, sigma_30 in zip(RANGING_SOURCE_ID[chosen].tolist(), *columns, strict=True)
+    ]

@@ -30,6 +30,7 @@ class Condition:
 def conclude(
     tracked: BoolArray,
     tracks: Tracks,
+    known: EphemerisState,
     measured: Measured,
     made: Corrections,
     exclusions: Exclusions,
@@ -56,7 +57,7 @@ def conclude(
     reasons: tuple[tuple[ArrayLike, ChannelState, ArrayLike], ...] = (
         (~seen & ~visible, ChannelState.NOT_TRACKED, ExclusionCause.NONE),
         (~seen, ChannelState.NOT_TRACKED, ExclusionCause.NOT_TRACKED),
-        (np.isnan(measured.elevation_rad), excluded, ExclusionCause.NO_EPHEMERIS),
+        (np.isnan(measured.elevation_rad + known.crc), excluded, ExclusionCause.NO_EPHEMERIS),
         (~visible, excluded, ExclusionCause.BELOW_MASK),
         (exclusions.satellites.excluded, excluded, exclusions.satellites.cause),
         (waiting, ChannelState.SETTLING, ExclusionCause.SETTLING),

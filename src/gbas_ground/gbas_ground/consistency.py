@@ -127,7 +127,6 @@ def form_corrections(measured: Measured, exclusions: Exclusions, params: GroundP
     used = used & np.isfinite(adjusted).all(axis=0)
     count = used.sum(axis=0).astype(np.float64)
     sigmas = broadcast_sigmas(params, measured.elevation_rad, count)
-    rate = form.rate_mps(measured.correction_m, measured.previous_m, measured.dt_s, weights, used)
     return Corrections(
         in_use=in_use,
         common=common,
@@ -135,11 +134,22 @@ def form_corrections(measured: Measured, exclusions: Exclusions, params: GroundP
         used=used,
         count=count,
         prc_m=form.average_m(adjusted, used),
-        rrc_mps=rate,
+        rrc_mps=_rates(measured, used, weights, params),
         b_m=form.b_values_m(adjusted, used),
         sigmas=sigmas,
         channel_sigma_m=channel_sigma_m(np.stack([sigmas.gnd_d_m, sigmas.gnd_30_m]), count, weights),
     )
+
+
+def _rates(measured: Measured, used: BoolArray, weights: FloatArray, params: GroundParams) -> FloatArray:
+    """RRC from the channels that were there at the epoch before too, ``(tau, N)``."""
+    both = used & np.isfinite(measured.previous_m).all(axis=0)
+    if not np.array_equal(both, used):
+        of_clock = both & (weights > 0.0).any(axis=0)
+        _, common = form.common_satellites(of_clock, min_common=params.min_common_satellites, min_receivers=1)
+        weights = form.clock_weights(common, None if params.clock_weighting == "plain" else measured.elevation_rad)
+        both = both & np.isfinite(form.receiver_clock_m(measured.correction_m, weights)).all(axis=0)
+    return form.rate_mps(measured.correction_m, measured.previous_m, measured.dt_s, weights, both)
 
 
 def b_value_check(made: Corrections, params: GroundParams) -> MonitorResult:
@@ -296,16 +306,16 @@ def standing(
 def _together(measured: Measured, made: Corrections, channel_ok: BoolArray, params: GroundParams) -> Standing:
     """What passes in constellations without a clock when nothing is excluded there."""
     channels, receivers = np.zeros_like(channel_ok), np.zeros(len(channel_ok), dtype=bool)
-    stuck = ~made.common.any(axis=1) & (channel_ok.any(axis=0) & CLOCK_GROUPS).any(axis=1)
+    tracked = np.logical_or.reduce(channel_ok, axis=0)
+    stuck = ~np.logical_or.reduce(made.common, axis=1) & np.logical_or.reduce(tracked & CLOCK_GROUPS, axis=1)
     if stuck.any():
         trial = form_corrections(
             replace(measured, settled=measured.settled & channel_ok), no_exclusions(params), params
         )
-        failed: BoolArray = np.asarray(b_value_check(trial, params).failed.any(axis=(0, 1)))
-        for _, result in limit_checks(trial, params):
-            failed = failed | np.asarray(result.failed.any(axis=0))
+        results = [b_value_check(trial, params).failed.any(axis=0), *(r.failed for _, r in limit_checks(trial, params))]
+        failed = np.logical_or.reduce(np.concatenate(results), axis=0)
         for k, group in enumerate(CLOCK_GROUPS):
-            if stuck[k] and trial.common[k].any() and not (failed & group).any():
+            if stuck[k] and trial.common[k].any() and not np.any(failed & group):
                 channels = channels | (trial.used & group)
                 receivers = receivers | trial.in_use[k]
     return Standing(channels=channels, receivers=receivers, satellites=np.asarray(channels.any(axis=0)))

@@ -276,7 +276,9 @@ def _process(
     correction = range_correction_m(should.range_m, tracks.smoothed_m, should.clock_s)
     measured = Measured(
         correction_m=correction,
-        previous_m=_previous_corrections(state.before, known.current, changed, correction.shape, site),
+        previous_m=_previous_corrections(
+            state.before if dt_s <= params.max_gap_s else None, known.current, changed, correction.shape, site
+        ),
         dt_s=dt_s,
         settled=_settled(tracks, correction, should, params),
         elevation_rad=should.elevation_rad,
@@ -286,7 +288,7 @@ def _process(
     channel_ok = tracked & ~np.any([check.failed for _, check in checks], axis=0)
     new_exclusions = _advanced(new_exclusions, measured, made, channel_ok, dt_s, params)
 
-    condition = conclude(tracked, tracks, measured, made, new_exclusions, params)
+    condition = conclude(tracked, tracks, known, measured, made, new_exclusions, params)
     integrity = integrity_of(epoch.gps_week, epoch.tow_s, known, measured, made, condition)
     serving = bool((condition.state == ChannelState.USABLE).any())
     _satellite_events(state, condition, serving, findings, events)
