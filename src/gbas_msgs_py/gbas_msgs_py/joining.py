@@ -92,16 +92,17 @@ class EpochJoiner(Generic[T]):
         """Give out all that is pending, at the end of the data."""
         return self._release_through(max(self._pending)) if self._pending else []
 
-    def postpone(self, seconds: float) -> None:
-        """Move all deadlines: for time in which the caller could not receive."""
-        self._pending = {key: (arrival + seconds, items) for key, (arrival, items) in self._pending.items()}
-
     @property
     def deadline_s(self) -> float | None:
         """Earliest deadline; None when nothing is pending."""
         if not self._pending:
             return None
         return min(arrival for arrival, _ in self._pending.values()) + self._timeout_s
+
+    @property
+    def heard_all(self) -> bool:
+        """Whether every source has delivered something."""
+        return None not in self._watermark.values()
 
     def _release_through(self, key: int) -> list[JoinedEpoch[T]]:
         joined = []
@@ -247,6 +248,11 @@ class AirborneJoiner(Generic[T]):
         self.timed_out = 0
 
     @property
+    def heard_all(self) -> bool:
+        """Whether any burst has been delivered."""
+        return self._bursts.passed is not None
+
+    @property
     def duplicate_bursts(self) -> int:
         """Bursts of a frame and slot that had been received before; the first is kept."""
         return self._bursts.duplicate
@@ -274,10 +280,6 @@ class AirborneJoiner(Generic[T]):
     def flush(self) -> list[AirborneInput[T]]:
         """Give out all pending observations, at the end of the data."""
         return self._release(len(self._pending))
-
-    def postpone(self, seconds: float) -> None:
-        """Move all deadlines: for time in which the caller could not receive."""
-        self._pending = [(key, arrival + seconds, item) for key, arrival, item in self._pending]
 
     @property
     def deadline_s(self) -> float | None:

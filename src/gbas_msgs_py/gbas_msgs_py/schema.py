@@ -116,10 +116,7 @@ class TableSchema(Generic[R]):
             raise SchemaError(f"{self.identifier}: encodes {self.record_type.__name__}, not {type(record).__name__}")
         _check_epoch(self.identifier, float(record.gps_week), float(record.tow_s))
         head = [record.gps_week, record.tow_s, *[getattr(record, name) for name in self._scalars]]
-        if not self.has_satellites:
-            table = np.array([head], dtype=np.float64)
-        else:
-            table = self._satellite_rows(record, head)
+        table = self._satellite_rows(record, head) if self.has_satellites else np.array([head], dtype=np.float64)
         _check_finite_or_nan(self.identifier, self.columns, table)
         return table
 

@@ -1,0 +1,478 @@
+"""Base of all nodes: parameters, publishers and subscriptions of the contract, diagnostics, start and end.
+
+A node decodes, calls one step, encodes; everything that every node does is here:
+
+- Parameters come from a frozen dataclass. Unknown names, wrong types and values out of bounds end the program with one
+  line and exit code 2.
+- A message that cannot be decoded is dropped, counted and reported in ``/diagnostics``; the node goes on.
+- The first epoch is held back until every output has its readers, so a chain of processes loses nothing at its start.
+- SIGINT and SIGTERM let the node publish what is pending; the exit code is then 0.
+
+Programs that run nodes must be started as console scripts or with ``python -m``: the ROS wheels re-execute Python once.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import signal
+import sys
+import threading
+import time
+from collections import Counter, deque
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, Final, Generic, TypeVar
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from rclpy.signals import SignalHandlerOptions
+from std_msgs.msg import Float64, Float64MultiArray, String, UInt8, UInt8MultiArray
+
+from gbas_core.record import Record
+from gbas_msgs_py import ros, topics
+from gbas_msgs_py.events import Event
+from gbas_msgs_py.parameters import ParameterError, field_types, parameters_from, require, unknown_parameters
+from gbas_msgs_py.qos import qos_of
+from gbas_msgs_py.schema import SchemaError, TableSchema
+from gbas_msgs_py.tables import PROGRESS, ProgressEpoch
+from gbas_msgs_py.vdb.burst import Burst
+
+R = TypeVar("R", bound=Record)
+Factory = Callable[[], "GbasNode"]
+
+EXIT_OK: Final = 0
+EXIT_BAD_START: Final = 2
+EXIT_FAILED: Final = 3
+REPORT_PERIOD_S: Final = 1.0
+_POLL_S: Final = 0.1
+_GATE_POLL_S: Final = 0.01
+SECTIONS: Final = ("ground", "airborne", "sim", "qos_overrides")
+"""First words of dotted parameters that belong to a part of the suite; one file may hold them for all nodes."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class NodeParams:
+    """Parameters every node has.
+
+    Attributes
+    ----------
+    start_wait_s : float
+        The first epoch is held until every output has its readers and every input was heard, at most this long [s].
+    recorders : int
+        Readers on each output beside those of the chain, such as a recorder, that are waited for at the start.
+    silence_s : float
+        After this long without input the node reports an error in its diagnostics [s].
+    """
+
+    start_wait_s: float = 10.0
+    recorders: int = 0
+    silence_s: float = 3.0
+
+    def __post_init__(self) -> None:
+        require("start_wait_s", self.start_wait_s, 0.0 <= self.start_wait_s <= 3600.0, "0 to 3600 s")
+        require("recorders", self.recorders, 0 <= self.recorders <= 100, "0 to 100")
+        require("silence_s", self.silence_s, 0.0 < self.silence_s <= 3600.0, "more than 0, up to 3600 s")
+
+
+class TablePublisher(Generic[R]):
+    """Publishes records of one schema."""
+
+    def __init__(self, publisher: Publisher, schema: TableSchema[R]) -> None:
+        self._publisher = publisher
+        self._schema = schema
+
+    def publish(self, record: R) -> None:
+        """Encode and send a record."""
+        self._publisher.publish(ros.table_to_msg(self._schema, record))
+
+
+class GbasNode(Node):
+    """A node of the suite.
+
+    Parameters
+    ----------
+    name : str
+        Default node name.
+    params_type : type
+        Frozen dataclass derived from :class:`NodeParams`.
+    **kwargs
+        Passed to :class:`rclpy.node.Node`; the namespace is ``/gbas`` unless given.
+    """
+
+    def __init__(self, name: str, params_type: type[NodeParams], **kwargs: Any) -> None:
+        kwargs.setdefault("namespace", topics.DEFAULT_NAMESPACE)
+        super().__init__(name, **kwargs)
+        self.params: Any = self._declare(params_type)
+        self.activity = 0
+        self.exit_code: int | None = None
+        self.processed = 0
+        self.last_epoch: tuple[int, float] | None = None
+        self.problems: Counter[str] = Counter()
+        self.last_problem = ""
+        self._reported_problems = 0
+        self._heard_s = time.monotonic()
+        self._report_due_s = 0.0
+        self._gated: list[tuple[Publisher, int]] = []
+        self._backlog: deque[Callable[[], None]] = deque()
+        self._backlog_since_s: float | None = None
+        self._open = False
+        self._events = self._publisher(String, topics.EVENTS)
+        self._diagnostics = self._publisher(DiagnosticArray, topics.DIAGNOSTICS)
+        self._progress = self._publisher(Float64MultiArray, topics.progress(self.get_name()))
+
+    # --- parameters
+
+    def overrides(self, prefix: str = "") -> dict[str, Any]:
+        """Parameter values given from outside whose names start with `prefix`, by the rest of their names."""
+        given = {name: p.value for name, p in self._parameter_overrides.items() if name.startswith(prefix)}
+        return {name[len(prefix) :]: list(v) if hasattr(v, "typecode") else v for name, v in given.items()}
+
+    def _declare(self, params_type: type[NodeParams]) -> NodeParams:
+        known = field_types(params_type)
+        given = self.overrides()
+        params = parameters_from(params_type, {name: value for name, value in given.items() if name in known})
+        for item in dataclasses.fields(params):
+            value = getattr(params, item.name)
+            self.declare_read_only(item.name, value, str(item.type))
+        return params
+
+    def declare_read_only(self, name: str, value: Any, description: str) -> None:
+        """Show a parameter's value to ROS; values given from outside have been taken already."""
+        descriptor = ParameterDescriptor(description=description, read_only=True, dynamic_typing=True)
+        if isinstance(value, tuple):
+            value = list(value) or [""]
+        self.declare_parameter(name, value, descriptor, ignore_override=True)
+
+    def check_overrides(self) -> None:
+        """Refuse parameters that nothing in this node has declared; the end of the start."""
+        given = [name for name in self.overrides() if name.partition(".")[0] not in SECTIONS]
+        unknown_parameters(given, [*self._parameters, "use_sim_time"])
+        qos = [name for name in self.overrides() if name.startswith("qos_overrides.")]
+        unknown_parameters(qos, self._parameters)
+
+    # --- outputs
+
+    def table_publisher(self, topic: str, schema: TableSchema[R], *, readers: int = 0) -> TablePublisher[R]:
+        """Publisher of records; the first epoch waits until it has `readers` readers beside the recorders."""
+        return TablePublisher(self._gated_publisher(Float64MultiArray, topic, readers), schema)
+
+    def burst_publisher(self, topic: str, *, readers: int = 0) -> Callable[[Burst], None]:
+        """Function that sends a burst."""
+        publisher = self._gated_publisher(UInt8MultiArray, topic, readers)
+        return lambda burst: publisher.publish(ros.burst_to_msg(burst))
+
+    def message_publisher(self, message_type: type, topic: str) -> Publisher:
+        """Publisher of a standard message."""
+        return self._gated_publisher(message_type, topic, 0)
+
+    def float_publisher(self, topic: str) -> Callable[[float], None]:
+        """Function that sends a number; nothing is made when nobody listens."""
+        publisher = self._gated_publisher(Float64, topic, 0)
+
+        def publish(value: float) -> None:
+            if publisher.get_subscription_count():
+                publisher.publish(Float64(data=value))
+
+        return publish
+
+    def uint8_publisher(self, topic: str) -> Callable[[int], None]:
+        """Function that sends a small integer; nothing is made when nobody listens."""
+        publisher = self._gated_publisher(UInt8, topic, 0)
+
+        def publish(value: int) -> None:
+            if publisher.get_subscription_count():
+                publisher.publish(UInt8(data=value))
+
+        return publish
+
+    def publish_schemas(self) -> None:
+        """Put the schema dictionary on its topic, where late readers find it."""
+        self._publisher(String, topics.SCHEMAS).publish(ros.schemas_msg())
+
+    def publish_events(self, events: Iterable[Event]) -> None:
+        """Send events, in order."""
+        for event in events:
+            self._events.publish(ros.event_to_msg(event))
+
+    def finished_epoch(self, gps_week: int, tow_s: float) -> None:
+        """Note that an epoch is done, and say so to whoever drives the data."""
+        self.processed += 1
+        self.last_epoch = (gps_week, tow_s)
+        self._publish_progress()
+
+    def _publish_progress(self) -> None:
+        if self.last_epoch is not None and self._progress.get_subscription_count():
+            record = ProgressEpoch(gps_week=self.last_epoch[0], tow_s=self.last_epoch[1])
+            self._progress.publish(ros.table_to_msg(PROGRESS, record))
+
+    def _publisher(self, message_type: type, topic: str) -> Publisher:
+        options = QoSOverridingOptions.with_default_policies()
+        profile = ros.qos_profile(qos_of(topic))
+        return self.create_publisher(message_type, topic, profile, qos_overriding_options=options)
+
+    def _gated_publisher(self, message_type: type, topic: str, readers: int) -> Publisher:
+        publisher = self._publisher(message_type, topic)
+        self._gated.append((publisher, readers + self.params.recorders))
+        return publisher
+
+    # --- inputs
+
+    def table_subscription(
+        self, topic: str, schema: TableSchema[R], callback: Callable[[R], None], *, quiet: bool = False
+    ) -> None:
+        """Call back with each record; with `quiet` they do not count as input whose absence is reported."""
+        self._subscription(
+            Float64MultiArray, topic, lambda message: ros.table_from_msg(message, schema), callback, quiet
+        )
+
+    def burst_subscription(self, topic: str, callback: Callable[[Burst], None]) -> None:
+        """Call back with each burst."""
+        self._subscription(UInt8MultiArray, topic, ros.burst_from_msg, callback, quiet=False)
+
+    def _subscription(
+        self,
+        message_type: type,
+        topic: str,
+        decode: Callable[[Any], Any],
+        callback: Callable[[Any], None],
+        quiet: bool,
+    ) -> None:
+        def receive(message: Any) -> None:
+            self.activity += 1
+            try:
+                item = decode(message)
+            except SchemaError as error:
+                self.problem(f"bad message on {topic}", str(error))
+                return
+            if not quiet:
+                self._heard_s = time.monotonic()
+            callback(item)
+
+        options = QoSOverridingOptions.with_default_policies()
+        profile = ros.qos_profile(qos_of(topic))
+        self.create_subscription(message_type, topic, receive, profile, qos_overriding_options=options)
+
+    def problem(self, kind: str, detail: str = "") -> None:
+        """Count something that went wrong without ending the node; diagnostics and the log show it."""
+        self.problems[kind] += 1
+        self.last_problem = f"{kind}: {detail}" if detail else kind
+        self.get_logger().warning(self.last_problem, throttle_duration_sec=1.0)
+
+    # --- start gate
+
+    def when_ready(self, work: Callable[[], None]) -> None:
+        """Do the work now, or as soon as the outputs have their readers; work keeps its order."""
+        if self._open:
+            work()
+            return
+        self._backlog.append(work)
+        if self._backlog_since_s is None:
+            self._backlog_since_s = time.monotonic()
+
+    def missing_readers(self) -> list[str]:
+        """Outputs that have fewer readers than they need, with how many."""
+        counts = [(p.topic_name, p.get_subscription_count(), needed) for p, needed in self._gated]
+        return [f"{name} has {count} of {needed} readers" for name, count, needed in counts if count < needed]
+
+    def starting(self) -> bool:
+        """Whether an input that was never heard may still be waited for."""
+        since = self._backlog_since_s
+        return since is None or time.monotonic() < since + self.params.start_wait_s
+
+    def _poll_gate(self) -> None:
+        if self._open or self._backlog_since_s is None:
+            return
+        lacking = self.missing_readers()
+        if lacking and self.starting():
+            return
+        if lacking:
+            self.problem("started without readers", "; ".join(lacking))
+        self._open_gate()
+
+    def _open_gate(self) -> None:
+        self._open = True
+        while self._backlog:
+            self._backlog.popleft()()
+
+    # --- life
+
+    def poll(self, idle: bool) -> float:
+        """Work that is due by wall time; returns seconds until there may be more.
+
+        `idle` is True when no message was waiting: only then may a deadline for missing data be enforced.
+        """
+        now = time.monotonic()
+        self._poll_gate()
+        if now >= self._report_due_s:
+            self._report_due_s = now + REPORT_PERIOD_S
+            self._report(now)
+            self._publish_progress()  # a reader that was discovered late would wait for it for ever
+        wait = self.due(now) if idle else _POLL_S
+        return min(wait, _POLL_S if self._open or self._backlog_since_s is None else _GATE_POLL_S)
+
+    def due(self, now_s: float) -> float:
+        """Enforce deadlines (overridden by nodes that have any); returns seconds until the next."""
+        return _POLL_S
+
+    def finish(self) -> None:
+        """Publish what is pending; called once, when the node ends in an orderly way."""
+
+    def end(self, exit_code: int = EXIT_OK) -> None:
+        """End the program after the current callback."""
+        self.exit_code = exit_code
+
+    def close(self, *, orderly: bool) -> None:
+        """Finish and release the node."""
+        if orderly:
+            self._open_gate()
+            self.finish()
+            self._report(time.monotonic(), final=True)
+            for publisher in [*self.publishers]:
+                publisher.wait_for_all_acked(Duration(seconds=1))
+        self.destroy_node()
+
+    # --- diagnostics
+
+    def details(self) -> dict[str, Any]:
+        """More values for the node's diagnostics (overridden)."""
+        return {}
+
+    def statuses(self) -> list[DiagnosticStatus]:
+        """More statuses, one a monitor (overridden)."""
+        return []
+
+    def _report(self, now_s: float, *, final: bool = False) -> None:
+        level, message = self._health(now_s)
+        values: dict[str, Any] = {
+            "epochs": self.processed,
+            "last_epoch": "none" if self.last_epoch is None else f"{self.last_epoch[0]} {self.last_epoch[1]:.3f}",
+            "problems": self.problems.total(),
+            "last_problem": self.last_problem,
+            **{f"count of {kind}": count for kind, count in sorted(self.problems.items())},
+            **self.details(),
+        }
+        if final:
+            message = "ended"
+        array = DiagnosticArray(status=[ros.diagnostic(self.get_name(), level, message, values), *self.statuses()])
+        array.header.stamp = self.get_clock().now().to_msg()
+        self._diagnostics.publish(array)
+
+    def _health(self, now_s: float) -> tuple[bytes, str]:
+        fresh = self.problems.total() - self._reported_problems
+        self._reported_problems = self.problems.total()
+        silent_s = now_s - self._heard_s
+        if self.last_epoch is None and not fresh:
+            waiting = "; ".join(self.missing_readers()) if self._backlog else "no data yet"
+            return DiagnosticStatus.STALE, f"waiting: {waiting}"
+        if silent_s > self.params.silence_s:
+            return DiagnosticStatus.ERROR, f"no input for {silent_s:.0f} s"
+        if fresh:
+            return DiagnosticStatus.WARN, f"{fresh} problems since the last report; the last: {self.last_problem}"
+        return DiagnosticStatus.OK, "running"
+
+
+def run(factories: Factory | Sequence[Factory], args: Sequence[str] | None = None) -> None:
+    """Run one node, or several in one process, until a signal or until one of them ends; then exit.
+
+    Exit codes: 0 in order, 2 for parameters or files that cannot be used, 3 when a node gives up.
+    """
+    sys.exit(serve([factories] if callable(factories) else list(factories), args))
+
+
+def serve(factories: Sequence[Factory], args: Sequence[str] | None = None) -> int:
+    """As :func:`run`, but returns the exit code."""
+    signals = _Signals()
+    nodes: list[GbasNode] = []
+    try:
+        rclpy.init(args=None if args is None else list(args), signal_handler_options=SignalHandlerOptions.NO)
+        for factory in factories:
+            nodes.append(factory())
+            nodes[-1].check_overrides()
+    except (ValueError, OSError, RuntimeError) as error:
+        print(_start_error(error), file=sys.stderr, flush=True)
+        _release(nodes, None, orderly=False)
+        return EXIT_BAD_START
+    executor = _executor()
+    for node in nodes:
+        executor.add_node(node)
+    orderly = False
+    try:
+        _spin(executor, nodes, signals)
+        orderly = True
+    finally:
+        _release(nodes, executor, orderly=orderly)
+    codes = [node.exit_code for node in nodes if node.exit_code]
+    return max(codes, default=EXIT_OK)
+
+
+def _spin(executor: Any, nodes: Sequence[GbasNode], signals: _Signals) -> None:
+    signals.wake = lambda: executor.create_task(lambda: None)
+    wait_s, poll_at_s = 0.0, 0.0
+    while not signals.stop.is_set() and all(node.exit_code is None for node in nodes):
+        before = sum(node.activity for node in nodes)
+        executor.spin_once(timeout_sec=wait_s)
+        idle = before == sum(node.activity for node in nodes)
+        now = time.monotonic()
+        if idle or now >= poll_at_s:
+            poll_at_s = now + _POLL_S
+            due_s = min(node.poll(idle) for node in nodes)
+        wait_s = due_s if idle else 0.0
+
+
+def _release(nodes: Sequence[GbasNode], executor: Any, *, orderly: bool) -> None:
+    for node in nodes:
+        if executor is not None:
+            executor.remove_node(node)
+        node.close(orderly=orderly)
+    if executor is not None:
+        executor.shutdown()
+    rclpy.try_shutdown()
+
+
+def _executor() -> Any:
+    """The executor that costs least a message (117 against 235 us); the plain one where it is missing."""
+    try:
+        from rclpy.experimental import EventsExecutor
+    except ImportError:
+        from rclpy.executors import SingleThreadedExecutor
+
+        return SingleThreadedExecutor()
+    return EventsExecutor()
+
+
+def _start_error(error: Exception) -> str:
+    program = os.path.basename(sys.argv[0]).removesuffix(".py")
+    return f"{program}: {str(error).strip()}"
+
+
+class _Signals:
+    """SIGINT and SIGTERM as a flag.
+
+    The signals are blocked and awaited by a thread: a handler would run only once the executor returns to Python, and
+    rclpy's own handlers end the context before anything pending can be published. A second signal ends at once.
+    """
+
+    _AWAITED: Final = frozenset({signal.SIGINT, signal.SIGTERM})
+
+    def __init__(self) -> None:
+        self.stop = threading.Event()
+        self.wake: Callable[[], Any] | None = None
+        signal.pthread_sigmask(signal.SIG_BLOCK, self._AWAITED)
+        threading.Thread(target=self._await, name="signals", daemon=True).start()
+
+    def _await(self) -> None:
+        while True:
+            signal.sigwait(self._AWAITED)
+            if self.stop.is_set() or self.wake is None:
+                os._exit(EXIT_OK if self.wake is None else 130)
+            self.stop.set()
+            self.wake()
+
+
+__all__ = ["GbasNode", "NodeParams", "ParameterError", "TablePublisher", "require", "run", "serve"]
