@@ -1,64 +1,14 @@
-"""Approaches a station broadcasts: from a configuration file to the FAS data block."""
+"""Approaches a station broadcasts: from a final approach to the FAS data block."""
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Mapping
-from typing import Any, Final
 
 from gbas_core.approach import FinalApproach
+from gbas_core.approach_keys import approach_from_mapping
 from gbas_msgs_py.vdb.messages import FasBlock, FasDataSet
 
-_ANGLES: Final = {
-    "ltp_latitude_deg": "ltp_lat_rad",
-    "ltp_longitude_deg": "ltp_lon_rad",
-    "delta_fpap_latitude_deg": "delta_fpap_lat_rad",
-    "delta_fpap_longitude_deg": "delta_fpap_lon_rad",
-    "course_deg": "course_rad",
-    "gpa_deg": "gpa_rad",
-}
-_LENGTHS: Final = (
-    "ltp_height_m", "fpap_distance_m", "tch_m", "course_width_m", "delta_length_offset_m", "fasval_m", "faslal_m",
-)  # fmt: skip
-_TEXTS: Final = ("airport_id", "runway", "route", "rpi")
-_NUMBERS: Final = ("apd", "rpds")
-_BY_COURSE: Final = {"course_deg", "fpap_distance_m"}
-_BY_FPAP: Final = {"delta_fpap_latitude_deg", "delta_fpap_longitude_deg"}
-_REQUIRED: Final = ("ltp_latitude_deg", "ltp_longitude_deg", "ltp_height_m", "tch_m", "gpa_deg", "fasval_m", "faslal_m")
-
-
-def approach_from_mapping(mapping: Mapping[str, Any]) -> FinalApproach:
-    """Final approach from the keys of a configuration file.
-
-    Parameters
-    ----------
-    mapping : mapping
-        ``ltp_latitude_deg``, ``ltp_longitude_deg``, ``ltp_height_m``; the course as ``course_deg`` (true) with
-        ``fpap_distance_m``, or as ``delta_fpap_latitude_deg`` with ``delta_fpap_longitude_deg``; ``tch_m``,
-        ``gpa_deg``, ``fasval_m``, ``faslal_m``; and, when wanted, ``course_width_m``, ``delta_length_offset_m``,
-        ``apd``, ``airport_id``, ``runway`` (``"26"``, ``"15R"``), ``route``, ``rpi``, ``rpds``.
-
-    Raises
-    ------
-    ValueError
-        Naming a key that is unknown, missing or out of bounds.
-    """
-    known = {*_ANGLES, *_LENGTHS, *_TEXTS, *_NUMBERS}
-    if unknown := sorted(set(mapping) - known):
-        raise ValueError(f"unknown key {unknown[0]!r}; known are {', '.join(sorted(known))}")
-    ways = (_BY_COURSE & set(mapping), _BY_FPAP & set(mapping))
-    if ways not in ((_BY_COURSE, set()), (set(), _BY_FPAP)):
-        raise ValueError(f"the course needs {' and '.join(sorted(_BY_COURSE))}, or {' and '.join(sorted(_BY_FPAP))}")
-    if missing := [key for key in _REQUIRED if key not in mapping]:
-        raise ValueError(f"{missing[0]} is missing")
-    arguments: dict[str, Any] = {
-        name: math.radians(_number(mapping, key)) for key, name in _ANGLES.items() if key in mapping
-    }
-    arguments |= {key: _number(mapping, key) for key in _LENGTHS if key in mapping}
-    arguments |= {key: _text(mapping, key) for key in _TEXTS if key in mapping}
-    arguments |= {key: _whole(mapping, key) for key in _NUMBERS if key in mapping}
-    return FinalApproach.from_course(**arguments) if ways[0] else FinalApproach(**arguments)
+__all__ = ["approach_from_mapping", "fas_data_set"]
 
 
 def fas_data_set(approach: FinalApproach) -> FasDataSet:
@@ -92,24 +42,3 @@ def fas_data_set(approach: FinalApproach) -> FasDataSet:
         delta_length_offset_m=approach.delta_length_offset_m,
     )
     return FasDataSet(fas=block, fasval_m=approach.fasval_m, faslal_m=approach.faslal_m)
-
-
-def _number(mapping: Mapping[str, Any], key: str) -> float:
-    value = mapping[key]
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise ValueError(f"{key} = {value!r} is not a number")
-    return float(value)
-
-
-def _whole(mapping: Mapping[str, Any], key: str) -> int:
-    value = mapping[key]
-    if isinstance(value, bool) or not isinstance(value, int):
-        raise ValueError(f"{key} = {value!r} is not a whole number")
-    return value
-
-
-def _text(mapping: Mapping[str, Any], key: str) -> str:
-    value = mapping[key]
-    if not isinstance(value, str):
-        raise ValueError(f"{key} = {value!r} is not a text (quote it)")
-    return value
