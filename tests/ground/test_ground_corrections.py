@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from loop_corrections import corrections as by_loops
 
 from gbas_core.satellites import IS_GPS, N_SATS
 from gbas_core.signals import SPEED_OF_LIGHT_MPS
@@ -20,6 +19,7 @@ from gbas_ground.corrections import (
     rate_mps,
     receiver_clock_m,
 )
+from loop_corrections import corrections as by_loops
 
 # Values are metres of order 1e2; sums of tens of them round at about 1e-14 of that.
 ROUNDING_M = 1e-11
@@ -157,7 +157,9 @@ def test_rate_is_the_difference_of_the_corrections_while_nothing_changes():
     """Textbook: RRC = (PRC_k - PRC_{k-1}) / T."""
     now, tracked = scene(5, 3, 1.0)
     before = now + np.random.default_rng(6).normal(size=now.shape)
-    rate = rate_mps(now, before, 0.5, clock_weights(common_satellites(tracked, min_common=1, min_receivers=1)[1]), tracked)
+    rate = rate_mps(
+        now, before, 0.5, clock_weights(common_satellites(tracked, min_common=1, min_receivers=1)[1]), tracked
+    )
     assert rate == pytest.approx((formed(now, tracked)[0] - formed(before, tracked)[0]) / 0.5, abs=1e-8)
 
 
@@ -178,4 +180,6 @@ def test_sigma_after_clock_removal_against_a_simulation():
     noise = rng.normal(size=(n, 1, N_SATS)) * sigma
     rest = noise - receiver_clock_m(noise, weights)
     # the standard error of a sample sigma is 1/sqrt(2n) = 0.35 %; five of those
-    assert rest[:, 0, :8].std(axis=0) == pytest.approx(clock_removed_sigma_m(sigma, weights)[:8], rel=5 / np.sqrt(2 * n))
+    assert rest[:, 0, :8].std(axis=0) == pytest.approx(
+        clock_removed_sigma_m(sigma, weights)[:8], rel=5 / np.sqrt(2 * n)
+    )

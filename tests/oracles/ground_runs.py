@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from synthetic_ranges import HEIGHT_M, LATITUDE_RAD, LONGITUDE_RAD, TOW_S, WEEK, Truth, receiver_positions_m
 
 from gbas_core.ephemeris import Ephemeris
 from gbas_core.gpstime import add_seconds
@@ -18,6 +17,7 @@ from gbas_ground.station import GroundEpoch, GroundStation, StationState, initia
 from gbas_msgs_py.events import Event
 from gbas_msgs_py.records import IntegrityEpoch
 from gbas_msgs_py.vdb.burst import Burst
+from synthetic_ranges import HEIGHT_M, LATITUDE_RAD, LONGITUDE_RAD, TOW_S, WEEK, Truth, receiver_positions_m
 
 Observed = tuple[ObservationEpoch | None, ...]
 Change = Callable[[float, Observed], Observed]

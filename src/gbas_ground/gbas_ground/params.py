@@ -14,8 +14,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from collections.abc import Mapping
+from dataclasses import MISSING, dataclass, field, fields
 from pathlib import Path
 from typing import Any, Final
 
@@ -27,6 +27,7 @@ from gbas_core.frames import ecef_from_geodetic
 from gbas_core.record import FloatArray
 from gbas_core.satellites import SYSTEM_MASKS
 from gbas_ground.approaches import approach_from_mapping, fas_data_set
+from gbas_msgs_py.parameters import ParameterError, unknown_parameters
 from gbas_msgs_py.records import MAX_REFERENCE_RECEIVERS
 from gbas_msgs_py.vdb.burst import SLOT_NAMES
 from gbas_msgs_py.vdb.errors import VdbError
@@ -40,10 +41,6 @@ GCID_UNHEALTHY: Final = 7
 RSDS_NONE: Final = 255
 MIN_SERVICE_SATELLITES: Final = 4
 """Fewer corrections than this give nobody a position: the station then says that it is not healthy."""
-
-
-class ParameterError(ValueError):
-    """A parameter that cannot be used: names the field, the value and the bound."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -416,13 +413,11 @@ def _arguments(mapping: Mapping[str, Any]) -> dict[str, Any]:
         spec: ParameterSpec = item.metadata[_KEY]
         if spec.key in flat:
             arguments[item.name] = _from_file(spec, flat.pop(spec.key))
-        elif item.default is not field().default:
+        elif item.default is not MISSING:
             continue
         else:
             raise ParameterError(f"{spec.key} is missing ({spec.doc})")
-    if flat:
-        known = ", ".join(sorted(spec.key for _, spec, _ in parameter_specs()))
-        raise ParameterError(f"unknown key {sorted(flat)[0]!r}; known are {known}, approaches.<name>.*")
+    unknown_parameters(sorted(flat), [spec.key for _, spec, _ in parameter_specs()])
     return arguments
 
 
@@ -433,8 +428,11 @@ def _receivers(flat: dict[str, Any]) -> tuple[Any, ...]:
         key = f"receivers.rr{number}_ecef_m"
         if key not in flat:
             break
-        value = flat.pop(key)
-        positions.append(tuple(value) if isinstance(value, Sequence) and not isinstance(value, str) else value)
+        positions.append(_listed(flat.pop(key)))
+    if beyond := sorted(key for key in flat if re.fullmatch(r"receivers\.rr\d+_ecef_m", key)):
+        raise ParameterError(
+            f"{beyond[0]} has no place: receivers are rr1 to rr{MAX_REFERENCE_RECEIVERS}, without a gap"
+        )
     if not positions:
         raise ParameterError("receivers.rr1_ecef_m is missing: at least one reference receiver is needed")
     return tuple(positions)
@@ -455,9 +453,15 @@ def _approaches(flat: dict[str, Any]) -> tuple[FinalApproach, ...]:
     return tuple(approaches)
 
 
+def _listed(value: Any) -> Any:
+    """A list of a file or of a ROS parameter as a tuple; anything else as it is."""
+    return tuple(value) if hasattr(value, "__iter__") and not isinstance(value, str | bytes) else value
+
+
 def _from_file(spec: ParameterSpec, value: Any) -> Any:
     """A file's value in the field's unit; what is not a number is left for the check to refuse."""
-    if isinstance(value, (list, tuple)):
+    value = _listed(value)
+    if isinstance(value, tuple):
         return tuple(_from_file(spec, each) for each in value)
     if spec.per_unit != 1.0 and isinstance(value, (int, float)) and not isinstance(value, bool):
         return float(value) * spec.per_unit
