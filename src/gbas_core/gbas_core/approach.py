@@ -46,6 +46,26 @@ APD_C: Final = 1
 APD_CD: Final = 2
 
 
+# What a FAS data block can say, and what of it may be missing.
+_BOUNDS: Final[dict[str, tuple[float, float]]] = {
+    "ltp_lat_rad": (-np.pi / 2.0, np.pi / 2.0),
+    "ltp_lon_rad": (-np.pi, np.pi),
+    "ltp_height_m": (-512.0, 6041.5),
+    "delta_fpap_lat_rad": (-np.pi / 2.0, np.pi / 2.0),
+    "delta_fpap_lon_rad": (-np.pi, np.pi),
+    "tch_m": (0.0, 1638.35),
+    "gpa_rad": (float(np.deg2rad(0.01)), float(np.deg2rad(89.99))),
+    "course_width_m": (POINT_IN_SPACE_COURSE_WIDTH_M, 143.75),
+    "delta_length_offset_m": (0.0, 2032.0),
+    "fasval_m": (0.0, 50.8),
+    "faslal_m": (0.0, 50.8),
+    "apd": (0, 7),
+    "rpds": (0, 48),
+    "gerp_offset_m": (-1000.0, 1000.0),
+}
+_MAY_BE_MISSING: Final = frozenset({"delta_length_offset_m", "fasval_m", "faslal_m"})
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ApproachDeviation:
     """Where positions are relative to a final approach; arrays (...).
@@ -122,21 +142,9 @@ class FinalApproach:
     gerp_offset_m: float = GERP_OFFSET_M
 
     def __post_init__(self) -> None:
-        half_turn, right_angle = np.pi, np.pi / 2.0
-        bounds = {
-            "ltp_lat_rad": (-right_angle, right_angle),
-            "ltp_lon_rad": (-half_turn, half_turn),
-            "ltp_height_m": (-512.0, 6041.5),
-            "delta_fpap_lat_rad": (-right_angle, right_angle),
-            "delta_fpap_lon_rad": (-half_turn, half_turn),
-            "tch_m": (0.0, 1638.35),
-            "gpa_rad": (float(np.deg2rad(0.01)), float(np.deg2rad(89.99))),
-            "course_width_m": (POINT_IN_SPACE_COURSE_WIDTH_M, 143.75),
-            "gerp_offset_m": (-1000.0, 1000.0),
-        }
-        for name, (low, high) in bounds.items():
+        for name, (low, high) in _BOUNDS.items():
             value = getattr(self, name)
-            if not low <= value <= high:
+            if not low <= value <= high and not (name in _MAY_BE_MISSING and np.isnan(value)):
                 raise ValueError(f"final approach: {name} is {value}, it must be from {low:g} to {high:g}")
         if not self.runway_to_fpap_m > 0.0:
             raise ValueError("final approach: the FPAP is where the LTP is, so there is no course")
