@@ -29,9 +29,10 @@ from gbas_core.satellites import SYSTEM_MASKS
 from gbas_ground.approaches import approach_from_mapping, fas_data_set
 from gbas_msgs_py.parameters import ParameterError, unknown_parameters
 from gbas_msgs_py.records import MAX_REFERENCE_RECEIVERS
+from gbas_msgs_py.vdb.block import encode_body
 from gbas_msgs_py.vdb.burst import SLOT_NAMES
 from gbas_msgs_py.vdb.errors import VdbError
-from gbas_msgs_py.vdb.messages import AdditionalBlock1, AdditionalBlock3, AdditionalBlock4, FasDataSet, Type2
+from gbas_msgs_py.vdb.messages import AdditionalBlock1, AdditionalBlock3, AdditionalBlock4, FasDataSet, Type2, Type4
 from gbas_msgs_py.vdb.schedule import ScheduleParams, sources_that_fit
 
 _KEY: Final = "gbas_parameter"
@@ -447,7 +448,9 @@ def _approaches(flat: dict[str, Any]) -> tuple[FinalApproach, ...]:
     approaches = []
     for name in sorted(by_name):
         try:
-            approaches.append(approach_from_mapping(by_name[name]))
+            approach = approach_from_mapping(by_name[name])
+            encode_body(Type4(data_sets=(fas_data_set(approach),)))  # what cannot be broadcast is refused here
+            approaches.append(approach)
         except ValueError as error:
             raise ParameterError(f"approaches.{name}: {error}") from None
     return tuple(approaches)

@@ -1,0 +1,61 @@
+"""Node: monitored corrections in, VDB bursts out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from gbas_ground.nodes.configuration import station_params
+from gbas_ground.station import GroundStation, initial_broadcast_state
+from gbas_msgs_py import tables, topics
+from gbas_msgs_py.node import GbasNode, NodeParams, run
+from gbas_msgs_py.records import IntegrityEpoch
+from gbas_msgs_py.ros import empty_frame
+
+
+@dataclass(frozen=True, kw_only=True)
+class CorrectionBroadcastParams(NodeParams):
+    """Parameters of the node; those of the station are in the file and in ``ground.*``.
+
+    Attributes
+    ----------
+    config : str
+        Station file.
+    """
+
+    config: str = ""
+
+
+class CorrectionBroadcast(GbasNode):
+    """Runs :meth:`GroundStation.broadcast`; a frame without bursts is announced, so that nobody waits for it."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__("correction_broadcast", CorrectionBroadcastParams, **kwargs)
+        self.station = station_params(self, self.params.config)
+        self.state = initial_broadcast_state(self.station)
+        self.bursts_sent = 0
+        self.send = self.burst_publisher(topics.VDB, readers=1)
+        self.table_subscription(topics.GROUND_INTEGRITY, tables.INTEGRITY, self.on_integrity)
+
+    def on_integrity(self, integrity: IntegrityEpoch) -> None:
+        self.when_ready(partial(self.step, integrity))
+
+    def step(self, integrity: IntegrityEpoch) -> None:
+        self.state, bursts = GroundStation.broadcast(self.state, integrity, self.station)
+        for burst in bursts or (empty_frame(integrity.gps_week, integrity.tow_s),):
+            self.send(burst)
+        self.bursts_sent += len(bursts)
+        self.finished_epoch(integrity.gps_week, integrity.tow_s)
+
+    def details(self) -> dict[str, Any]:
+        return {"bursts": self.bursts_sent}
+
+
+def main() -> None:
+    """Console script."""
+    run(CorrectionBroadcast)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,97 @@
+"""Node: observations of the reference receivers and ephemerides in, monitored corrections out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from gbas_core.ephemeris import Ephemeris
+from gbas_core.gpstime import epoch_key, from_epoch_key
+from gbas_core.observations import ObservationEpoch
+from gbas_ground.nodes.configuration import station_params
+from gbas_ground.station import GroundEpoch, GroundStation, initial_monitor_state
+from gbas_msgs_py import tables, topics
+from gbas_msgs_py.joining import EpochJoiner, JoinedEpoch, ReceptionQueue
+from gbas_msgs_py.node import GbasNode, NodeParams, require, run
+
+
+@dataclass(frozen=True, kw_only=True)
+class IntegrityMonitorParams(NodeParams):
+    """Parameters of the node; those of the station are in the file and in ``ground.*``.
+
+    Attributes
+    ----------
+    config : str
+        Station file.
+    join_timeout_s : float
+        An epoch is processed without the receivers still missing this long after the first delivered it [s].
+    """
+
+    config: str = ""
+    join_timeout_s: float = 1.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require("join_timeout_s", self.join_timeout_s, 0.0 < self.join_timeout_s <= 3600.0, "more than 0, up to 3600 s")
+
+
+class IntegrityMonitor(GbasNode):
+    """Joins the receivers by epoch and runs :meth:`GroundStation.monitor`."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__("integrity_monitor", IntegrityMonitorParams, **kwargs)
+        self.station = station_params(self, self.params.config)
+        self.state = initial_monitor_state(self.station)
+        self.receivers = tuple(f"rr{j}" for j in range(1, self.station.n_receivers + 1))
+        self.joiner: EpochJoiner[ObservationEpoch] = EpochJoiner(self.receivers, timeout_s=self.params.join_timeout_s)
+        self.ephemerides: ReceptionQueue[Ephemeris] = ReceptionQueue()
+        self.integrity = self.table_publisher(topics.GROUND_INTEGRITY, tables.INTEGRITY, readers=1)
+        self.publish_schemas()
+        self.table_subscription(topics.EPHEMERIS, tables.EPHEMERIS, self.on_ephemeris, quiet=True)
+        for receiver, topic in zip(self.receivers, topics.GROUND_OBSERVATIONS, strict=False):
+            self.table_subscription(topic, tables.OBSERVATIONS, partial(self.on_observations, receiver))
+
+    def on_ephemeris(self, ephemeris: Ephemeris) -> None:
+        self.ephemerides.add(epoch_key(ephemeris.gps_week, ephemeris.tow_s), ephemeris)
+
+    def on_observations(self, receiver: str, observations: ObservationEpoch) -> None:
+        key = epoch_key(observations.gps_week, observations.tow_s)
+        self.steps(self.joiner.add(receiver, key, observations, self.now_s()))
+        self.note_counts(f"late or repeated epoch of {receiver}", self.joiner.dropped(receiver))
+
+    def due(self, now_s: float) -> float:
+        return self.enforce(self.joiner, now_s, self.steps)
+
+    def steps(self, epochs: Iterable[JoinedEpoch[ObservationEpoch]]) -> None:
+        for epoch in epochs:
+            self.when_ready(partial(self.step, epoch))
+
+    def step(self, joined: JoinedEpoch[ObservationEpoch]) -> None:
+        for receiver in joined.timed_out:
+            self.problem(f"no epoch from {receiver} in time")
+        week, tow_s = from_epoch_key(joined.key)
+        seen = [joined.items.get(receiver) for receiver in self.receivers]
+        epoch = GroundEpoch(
+            gps_week=week,
+            tow_s=tow_s,
+            observations=tuple(None if each is None or each.empty else each for each in seen),
+            ephemerides=self.ephemerides.take(joined.key),
+        )
+        self.state, integrity, events = GroundStation.monitor(self.state, epoch, self.station)
+        self.integrity.publish(integrity)
+        self.publish_events(events)
+        self.finished_epoch(week, tow_s)
+
+    def finish(self) -> None:
+        self.steps(self.joiner.flush())
+
+
+def main() -> None:
+    """Console script."""
+    run(IntegrityMonitor)
+
+
+if __name__ == "__main__":
+    main()
