@@ -41,6 +41,7 @@ from gbas_msgs_py.parameters import ParameterError, field_types, parameters_from
 from gbas_msgs_py.qos import qos_of
 from gbas_msgs_py.schema import SchemaError, TableSchema
 from gbas_msgs_py.tables import PROGRESS, ProgressEpoch
+from gbas_msgs_py.transport import use_profile
 from gbas_msgs_py.vdb.burst import Burst
 
 R = TypeVar("R", bound=Record)
@@ -389,6 +390,7 @@ def serve(factories: Sequence[Factory], args: Sequence[str] | None = None) -> in
     """As :func:`run`, but returns the exit code."""
     signals = _Signals()
     nodes: list[GbasNode] = []
+    use_profile(os.environ)
     try:
         rclpy.init(args=None if args is None else list(args), signal_handler_options=SignalHandlerOptions.NO)
         for factory in factories:
