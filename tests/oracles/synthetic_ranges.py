@@ -1,4 +1,4 @@
-"""A made-up constellation and noise-free observations of it, for tests whose expected values are known by construction."""
+"""A made-up constellation and noise-free observations of it: expected values are known by construction."""
 
 from __future__ import annotations
 

@@ -23,10 +23,11 @@ import numpy as np
 import yaml
 
 from gbas_core.approach import FinalApproach
+from gbas_core.approach_keys import approach_from_mapping
 from gbas_core.frames import ecef_from_geodetic
 from gbas_core.record import FloatArray
 from gbas_core.satellites import SYSTEM_MASKS
-from gbas_ground.approaches import approach_from_mapping, fas_data_set
+from gbas_ground.approaches import fas_data_set
 from gbas_msgs_py.parameters import ParameterError, unknown_parameters
 from gbas_msgs_py.records import MAX_REFERENCE_RECEIVERS
 from gbas_msgs_py.vdb.block import encode_body
