@@ -30,6 +30,8 @@ setup(
         "numpy",
         "matplotlib",
         "mcap",
+        "lz4",
+        "zstandard",
         "rosbags",
         "rich",
         "typer",
