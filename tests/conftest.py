@@ -10,8 +10,14 @@ import pytest
 
 @pytest.fixture(scope="session")
 def data_dir() -> Path:
-    """Folder of the recorded data: GBAS_DATA, or shared/data beside the repository; tests without it are skipped."""
+    """Folder of the recorded data: GBAS_DATA, or shared/data beside the repository.
+
+    Without it tests skip on a user's machine and fail in continuous integration.
+    """
     folder = Path(os.environ.get("GBAS_DATA") or Path(__file__).resolve().parents[2] / "shared" / "data")
     if not folder.is_dir():
-        pytest.skip(f"no recorded data at {folder}; set GBAS_DATA")
+        problem = f"no recorded data at {folder}; set GBAS_DATA"
+        if os.environ.get("CI"):
+            pytest.fail(problem)
+        pytest.skip(problem)
     return folder

@@ -14,6 +14,12 @@ import numpy as np
 import pyrtklib as rtk
 
 GPS, GALILEO = 0x01, 0x08
+_GALILEO_MESSAGES = {"inav": 0, "fnav": 1}
+
+
+def select_galileo_message(name: str) -> None:
+    """Which Galileo navigation message RTKLIB uses from now on: ``"inav"`` (its default) or ``"fnav"``."""
+    rtk.setseleph(rtk.SYS_GAL, _GALILEO_MESSAGES[name])
 
 
 def plain_copy(path: Path, folder: Path) -> Path:
@@ -36,6 +42,7 @@ def rtklib_positions(
     elevation_mask_deg: float = 5.0,
     troposphere: bool = True,
     ionosphere: bool = True,
+    galileo: str = "inav",
 ) -> dict[str, np.ndarray]:
     """Positions of the rover, epoch by epoch.
 
@@ -49,6 +56,7 @@ def rtklib_positions(
     dict
         ``key`` (n,) milliseconds of GPS time, ``xyz_m`` (n, 3), ``n_sats`` (n,).
     """
+    select_galileo_message(galileo)
     option = rtk.prcopt_default
     option.mode = rtk.PMODE_DGPS if base is not None else rtk.PMODE_SINGLE
     option.nf = 1
@@ -81,7 +89,7 @@ def rtklib_positions(
         raise RuntimeError(f"RTKLIB failed with status {status}")
     rows = [line.split() for line in output.read_text().splitlines() if line and not line.startswith("%")]
     week = np.array([int(row[0]) for row in rows])
-    tow = np.array([float(row[1]) for row in rows])
+    tow = np.round([float(row[1]) for row in rows], 1)  # RTKLIB takes the receiver clock off the time tag
     return {
         "key": np.round(week * 604_800_000 + tow * 1000.0).astype(np.int64),
         "xyz_m": np.array([[float(value) for value in row[2:5]] for row in rows]),

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pyrtklib as rtk
-from rtklib_dgnss import plain_copy
+from rtklib_dgnss import plain_copy, select_galileo_message
 
 C_MPS = 299_792_458.0
 
@@ -32,7 +32,9 @@ def _sat_name(number: int) -> str:
     return str(text[0])
 
 
-def read_ranges(observations: Path, navigation: list[Path], folder: Path) -> dict[int, RangeEpoch]:
+def read_ranges(
+    observations: Path, navigation: list[Path], folder: Path, *, galileo: str = "inav"
+) -> dict[int, RangeEpoch]:
     """Read a receiver's file and evaluate RTKLIB's broadcast orbits for each epoch.
 
     Returns
@@ -40,6 +42,7 @@ def read_ranges(observations: Path, navigation: list[Path], folder: Path) -> dic
     dict
         By epoch in milliseconds of GPS time.
     """
+    select_galileo_message(galileo)
     obs, nav, station = rtk.obs_t(), rtk.nav_t(), rtk.sta_t()
     for path in (observations, *navigation):
         if rtk.readrnx(str(plain_copy(path, folder)), 1, "", obs, nav, station) < 0:
@@ -65,10 +68,11 @@ def _evaluate(obs: rtk.obs_t, rows: list[int], nav: rtk.nav_t) -> RangeEpoch:
     epoch = RangeEpoch({}, {}, {})
     for place in range(count):
         name, code = _sat_name(data[place].sat), data[place].P[0]
-        if code == 0.0 or clock[2 * place] == 0.0 or health[place] != 0:
+        position = np.array([state[6 * place + axis] for axis in range(3)])
+        if code == 0.0 or not position.any() or health[place] != 0:
             continue
         epoch.code_m[name] = code
-        epoch.position_m[name] = np.array([state[6 * place + axis] for axis in range(3)])
+        epoch.position_m[name] = position
         epoch.clock_s[name] = clock[2 * place]
     return epoch
 

@@ -114,9 +114,7 @@ class Prepared:
 
     def chain(self) -> Chain:
         """A chain that has seen nothing yet."""
-        return Chain(
-            self.ground, self.airborne, self.recording.ephemerides(), self.recording.user_ephemerides()
-        )
+        return Chain(self.ground, self.airborne, self.recording.ephemerides(), self.recording.user_ephemerides())
 
 
 def prepare(request: ProcessRequest) -> Prepared:
@@ -231,7 +229,9 @@ def _header_positions(recording: Recording, notes: list[str]) -> tuple[tuple[flo
     positions = []
     for file in recording.ground:
         if file.approx_position_m is None:
-            raise GbasError(f"{file.path}: header has no APPROX POSITION XYZ; give the antenna position with --ground-xyz")
+            raise GbasError(
+                f"{file.path}: header has no APPROX POSITION XYZ; give the antenna position with --ground-xyz"
+            )
         notes.append(f"{file.path.name}: antenna position taken from the header, where it may be approximate")
         x, y, z = (float(value) for value in file.approx_position_m)
         positions.append((x, y, z))

@@ -34,5 +34,5 @@ def _ament_share() -> Path | None:
 
     try:
         return Path(get_package_share_directory(PACKAGE))
-    except (PackageNotFoundError, LookupError):
+    except (PackageNotFoundError, LookupError, OSError):  # not found, or no AMENT_PREFIX_PATH
         return None

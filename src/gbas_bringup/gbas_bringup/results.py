@@ -75,7 +75,9 @@ class Row:
                 f"{protection.gps_week}/{protection.tow_s} s"
             )
         position = np.array([solution.x_m, solution.y_m, solution.z_m])
-        protected = bool(np.isfinite(position).all() and math.isfinite(protection.vpl_m) and math.isfinite(protection.lpl_m))
+        protected = bool(
+            np.isfinite(position).all() and math.isfinite(protection.vpl_m) and math.isfinite(protection.lpl_m)
+        )
         service = ServiceType(int(protection.service)) if math.isfinite(protection.service) else ServiceType.NONE
         return cls(
             gps_week=solution.gps_week,
@@ -98,7 +100,10 @@ class Row:
             latitude, longitude, height = geodetic_from_ecef(self.position_m)
             degrees = [f"{float(angle):.10f}" for angle in np.degrees([latitude, longitude])]
             place = [*(repr(float(value)) for value in self.position_m), *degrees, f"{float(height):.4f}"]
-        levels = ["" if math.isnan(value) else repr(float(value)) for value in (self.vpl_m, self.lpl_m, self.val_m, self.lal_m)]
+        levels = [
+            "" if math.isnan(value) else repr(float(value))
+            for value in (self.vpl_m, self.lpl_m, self.val_m, self.lal_m)
+        ]
         head = (str(self.gps_week), repr(float(self.tow_s)))
         return (*head, *place, str(self.n_sats), self.service, *levels, str(int(self.alert)))
 
@@ -111,19 +116,21 @@ def write_solution_csv(path: Path, rows: Iterable[Row]) -> None:
         writer.writerows(row.fields() for row in rows)
 
 
-def error_statistics(rows: Sequence[Row], truth_m: np.ndarray) -> dict[str, Any]:
+def error_statistics(rows: Sequence[Row], truth_m: np.ndarray, *, course_rad: float = 0.0) -> dict[str, Any]:
     """Errors of the protected positions against the truth.
 
     Parameters
     ----------
     truth_m : (3,) or (len(rows), 3) array
         True antenna position [m], ECEF; NaN where unknown.
+    course_rad : float
+        True course about which the lateral protection level holds [rad]; north when there is no final approach.
 
     Returns
     -------
     dict
-        Root mean square and largest horizontal and vertical errors [m], and in how many epochs the vertical and the
-        horizontal error stayed within the vertical and lateral protection level.
+        Root mean square and largest errors [m], and in how many epochs the vertical and the lateral error stayed within
+        the protection levels; ``worst_ratio`` is the largest error over its protection level.
     """
     truth = np.broadcast_to(truth_m, (len(rows), 3))
     used = [k for k, row in enumerate(rows) if row.position_m is not None and np.isfinite(truth[k]).all()]
@@ -134,6 +141,7 @@ def error_statistics(rows: Sequence[Row], truth_m: np.ndarray) -> dict[str, Any]
     error_enu = (position - truth[used]) @ rot_enu_ecef(latitude, longitude).T
     horizontal = np.hypot(error_enu[:, 0], error_enu[:, 1])
     vertical = np.abs(error_enu[:, 2])
+    lateral = np.abs(error_enu[:, 0] * np.cos(course_rad) - error_enu[:, 1] * np.sin(course_rad))
     vpl = np.array([rows[k].vpl_m for k in used])
     lpl = np.array([rows[k].lpl_m for k in used])
     return {
@@ -142,9 +150,11 @@ def error_statistics(rows: Sequence[Row], truth_m: np.ndarray) -> dict[str, Any]
         "vertical_rms_m": float(np.sqrt(np.mean(vertical**2))),
         "horizontal_max_m": float(horizontal.max()),
         "vertical_max_m": float(vertical.max()),
+        "lateral_max_m": float(lateral.max()),
         "vertical_bounded_epochs": int((vertical <= vpl).sum()),
-        "horizontal_within_lpl_epochs": int((horizontal <= lpl).sum()),
+        "lateral_bounded_epochs": int((lateral <= lpl).sum()),
         "vertical_worst_ratio": float((vertical / vpl).max()),
+        "lateral_worst_ratio": float((lateral / lpl).max()),
     }
 
 

@@ -63,7 +63,7 @@ class Chain:
         self._ground_params = ground
         self._airborne_params = airborne
         self._ground_state: StationState = initial_station(ground)
-        self._airborne_state: AirborneState = AirborneReceiver.initial(airborne)
+        self._airborne_state: AirborneState = AirborneState()
         self._ground_ephemerides = _queue(ephemerides)
         self._airborne_ephemerides = _queue(user_ephemerides)
         # Nothing is ever late here, so the deadline is never asked for.
