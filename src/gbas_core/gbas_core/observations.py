@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from gbas_core.record import FloatArray, Record, per_satellite, scalar
 from gbas_core.signals import BANDS
 
@@ -23,6 +25,14 @@ class ObservationEpoch(Record):
     simulated: float = scalar("-", "1 if a simulator made these observations, 0 if a receiver did")
     code_m: FloatArray = per_satellite("m", "pseudorange", columns=_by_band("code", "_m"))
     carrier_m: FloatArray = per_satellite("m", "carrier range", columns=_by_band("carrier", "_m"))
-    doppler_hz: FloatArray = per_satellite("Hz", "Doppler, positive when approaching", columns=_by_band("doppler", "_hz"))
+    doppler_hz: FloatArray = per_satellite(
+        "Hz", "Doppler, positive when approaching", columns=_by_band("doppler", "_hz")
+    )
     cn0_dbhz: FloatArray = per_satellite("dB-Hz", "carrier to noise density", columns=_by_band("cn0", "_dbhz"))
     lli: FloatArray = per_satellite("-", "loss-of-lock indicator", columns=_by_band("lli", ""))
+
+    @property
+    def empty(self) -> bool:
+        """Whether no satellite has any value: the receiver has nothing to say for this epoch, as if it were absent."""
+        values = (self.code_m, self.carrier_m, self.doppler_hz, self.cn0_dbhz, self.lli)
+        return all(bool(np.isnan(each).all()) for each in values)

@@ -24,7 +24,7 @@ class RecordingError(ValueError):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RecordedEpoch:
-    """One epoch of a recording; a receiver without data then is None.
+    """One epoch of a recording; a receiver without any satellite then is None.
 
     Attributes
     ----------
@@ -106,10 +106,7 @@ class Recording:
         for key in self.keys.tolist():
             if key < first or (last is not None and key > last):
                 continue
-            seen = [
-                file.epoch(places[key]) if key in places else None
-                for file, places in zip(self._files(), rows, strict=True)
-            ]
+            seen = [_observed(file, places.get(key)) for file, places in zip(self._files(), rows, strict=True)]
             count = len(self.ground)
             yield RecordedEpoch(key=key, ground=tuple(seen[:count]), user=None if self.user is None else seen[count])
 
@@ -147,6 +144,14 @@ class Recording:
                         f"{file.path} ({_span(file)}) and {self.user.path} ({_span(self.user)}) "
                         "have no epoch in common; expected recordings of the same time"
                     )
+
+
+def _observed(file: ObservationFile, row: int | None) -> ObservationEpoch | None:
+    """The observations in a row of a file; None without a row, or when it has no satellite."""
+    if row is None:
+        return None
+    observation = file.epoch(row)
+    return None if observation.empty else observation
 
 
 def _span(file: ObservationFile) -> str:

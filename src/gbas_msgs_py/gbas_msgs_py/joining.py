@@ -104,6 +104,10 @@ class EpochJoiner(Generic[T]):
         """Whether every source has delivered something."""
         return None not in self._watermark.values()
 
+    def dropped(self, source: str) -> int:
+        """Items of a source that were late or repeated."""
+        return self.late[source] + self.duplicate[source]
+
     def _release_through(self, key: int) -> list[JoinedEpoch[T]]:
         joined = []
         for due in sorted(k for k in self._pending if k <= key):
@@ -253,9 +257,14 @@ class AirborneJoiner(Generic[T]):
         return self._bursts.passed is not None
 
     @property
-    def duplicate_bursts(self) -> int:
-        """Bursts of a frame and slot that had been received before; the first is kept."""
-        return self._bursts.duplicate
+    def dropped(self) -> int:
+        """Observations that were late or repeated."""
+        return self.late + self.duplicate
+
+    @property
+    def dropped_bursts(self) -> int:
+        """Bursts of a frame and slot that was there before, and bursts for which no observation came."""
+        return self._bursts.duplicate + self._bursts.overflow
 
     def add_observation(self, key: int, item: T, now_s: float) -> list[AirborneInput[T]]:
         """Deliver an observation; returns what can be processed, in order."""

@@ -25,6 +25,7 @@ from dataclasses import dataclass
 from typing import Any, Final, Generic, TypeVar
 
 import rclpy
+import rclpy.utilities
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.duration import Duration
@@ -32,6 +33,7 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.signals import SignalHandlerOptions
+from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float64, Float64MultiArray, String, UInt8, UInt8MultiArray
 
 from gbas_core.record import Record
@@ -50,9 +52,14 @@ Factory = Callable[[], "GbasNode"]
 EXIT_OK: Final = 0
 EXIT_BAD_START: Final = 2
 EXIT_FAILED: Final = 3
+STATUS_OK: Final = DiagnosticStatus.OK
+STATUS_WARN: Final = DiagnosticStatus.WARN
+STATUS_ERROR: Final = DiagnosticStatus.ERROR
+STATUS_STALE: Final = DiagnosticStatus.STALE
 REPORT_PERIOD_S: Final = 1.0
 _POLL_S: Final = 0.1
 _GATE_POLL_S: Final = 0.01
+_GRACE_S: Final = 0.005
 SECTIONS: Final = ("ground", "airborne", "sim", "qos_overrides")
 """First words of dotted parameters that belong to a part of the suite; one file may hold them for all nodes."""
 
@@ -88,6 +95,10 @@ class TablePublisher(Generic[R]):
         self._publisher = publisher
         self._schema = schema
 
+    def settled(self, timeout_s: float) -> bool:
+        """Wait until all readers have what was sent; False when that takes longer than the time-out."""
+        return bool(self._publisher.wait_for_all_acked(Duration(seconds=timeout_s)))
+
     def publish(self, record: R) -> None:
         """Encode and send a record."""
         self._publisher.publish(ros.table_to_msg(self._schema, record))
@@ -118,6 +129,8 @@ class GbasNode(Node):
         self.last_problem = ""
         self._reported_problems = 0
         self._heard_s = time.monotonic()
+        self._first_heard_s: float | None = None
+        self._overdue_at: int | None = None
         self._report_due_s = 0.0
         self._gated: list[tuple[Publisher, int]] = []
         self._backlog: deque[Callable[[], None]] = deque()
@@ -192,6 +205,16 @@ class GbasNode(Node):
 
         return publish
 
+    def clock_publisher(self) -> Callable[[int, float], None]:
+        """Function that sets ``/clock`` to an epoch; for whoever drives time."""
+        publisher = self._publisher(Clock, topics.CLOCK)
+
+        def publish(gps_week: int, tow_s: float) -> None:
+            if publisher.get_subscription_count():
+                publisher.publish(Clock(clock=ros.stamp_of(gps_week, tow_s)))
+
+        return publish
+
     def publish_schemas(self) -> None:
         """Put the schema dictionary on its topic, where late readers find it."""
         self._publisher(String, topics.SCHEMAS).publish(ros.schemas_msg())
@@ -232,6 +255,14 @@ class GbasNode(Node):
             Float64MultiArray, topic, lambda message: ros.table_from_msg(message, schema), callback, quiet
         )
 
+    def progress_subscription(self, reader: str, callback: Callable[[ProgressEpoch], None]) -> None:
+        """Call back when a reader, named by its node or its topic, has finished with an epoch."""
+        self.table_subscription(topics.progress(reader), PROGRESS, callback)
+
+    def has_progress_publisher(self, reader: str) -> bool:
+        """Whether a reader that says which epochs it has finished with is there."""
+        return self.count_publishers(self.resolve_topic_name(topics.progress(reader))) > 0
+
     def burst_subscription(self, topic: str, callback: Callable[[Burst], None]) -> None:
         """Call back with each burst."""
         self._subscription(UInt8MultiArray, topic, ros.burst_from_msg, callback, quiet=False)
@@ -253,6 +284,7 @@ class GbasNode(Node):
                 return
             if not quiet:
                 self._heard_s = time.monotonic()
+                self._first_heard_s = self._first_heard_s or self._heard_s
             callback(item)
 
         options = QoSOverridingOptions.with_default_policies()
@@ -264,6 +296,39 @@ class GbasNode(Node):
         self.problems[kind] += 1
         self.last_problem = f"{kind}: {detail}" if detail else kind
         self.get_logger().warning(self.last_problem, throttle_duration_sec=1.0)
+
+    def note_counts(self, kind: str, total: int) -> None:
+        """Report as problems what has been counted elsewhere."""
+        while self.problems[kind] < total:
+            self.problem(kind)
+
+    def now_s(self) -> float:
+        """Monotonic wall time, for deadlines only [s]."""
+        return time.monotonic()
+
+    def silent_s(self, now_s: float) -> float:
+        """Time since the last input [s]."""
+        return now_s - self._heard_s
+
+    def enforce(self, joiner: Any, now_s: float, steps: Callable[[Any], None]) -> float:
+        """Let a joiner give up on what is overdue; returns seconds until the next deadline.
+
+        Inputs that were never heard get the time of the start. What is overdue is given one more chance to be received:
+        the deadline may have passed while this process did not run.
+        """
+        deadline_s = joiner.deadline_s
+        first_s = self._first_heard_s
+        if deadline_s is None or first_s is None:
+            return _POLL_S
+        if not joiner.heard_all:
+            deadline_s = max(deadline_s, first_s + self.params.start_wait_s)
+        if now_s < deadline_s:
+            return float(deadline_s - now_s)
+        if self._overdue_at != self.activity:
+            self._overdue_at = self.activity
+            return _GRACE_S
+        steps(joiner.expire(now_s))
+        return 0.0
 
     # --- start gate
 
@@ -328,6 +393,11 @@ class GbasNode(Node):
         """End the program after the current callback."""
         self.exit_code = exit_code
 
+    def fail(self, reason: str) -> None:
+        """End the program because it cannot do its work."""
+        self.get_logger().fatal(reason)
+        self.end(EXIT_FAILED)
+
     def close(self, *, orderly: bool) -> None:
         """Finish and release the node."""
         if orderly:
@@ -349,7 +419,7 @@ class GbasNode(Node):
         return []
 
     def _report(self, now_s: float, *, final: bool = False) -> None:
-        level, message = self._health(now_s)
+        level, message = self.health(now_s)
         values: dict[str, Any] = {
             "epochs": self.processed,
             "last_epoch": "none" if self.last_epoch is None else f"{self.last_epoch[0]} {self.last_epoch[1]:.3f}",
@@ -364,18 +434,19 @@ class GbasNode(Node):
         array.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(array)
 
-    def _health(self, now_s: float) -> tuple[bytes, str]:
+    def health(self, now_s: float) -> tuple[bytes, str]:
+        """Level and text of the node's own status."""
         fresh = self.problems.total() - self._reported_problems
         self._reported_problems = self.problems.total()
-        silent_s = now_s - self._heard_s
+        silent_s = self.silent_s(now_s)
         if self.last_epoch is None and not fresh:
             waiting = "; ".join(self.missing_readers()) if self._backlog else "no data yet"
-            return DiagnosticStatus.STALE, f"waiting: {waiting}"
+            return STATUS_STALE, f"waiting: {waiting}"
         if silent_s > self.params.silence_s:
-            return DiagnosticStatus.ERROR, f"no input for {silent_s:.0f} s"
+            return STATUS_ERROR, f"no input for {silent_s:.0f} s"
         if fresh:
-            return DiagnosticStatus.WARN, f"{fresh} problems since the last report; the last: {self.last_problem}"
-        return DiagnosticStatus.OK, "running"
+            return STATUS_WARN, f"{fresh} problems since the last report; the last: {self.last_problem}"
+        return STATUS_OK, "running"
 
 
 def run(factories: Factory | Sequence[Factory], args: Sequence[str] | None = None) -> None:
@@ -434,13 +505,13 @@ def _release(nodes: Sequence[GbasNode], executor: Any, *, orderly: bool) -> None
         node.close(orderly=orderly)
     if executor is not None:
         executor.shutdown()
-    rclpy.try_shutdown()
+    rclpy.utilities.try_shutdown()
 
 
 def _executor() -> Any:
     """The executor that costs least a message (117 against 235 us); the plain one where it is missing."""
     try:
-        from rclpy.experimental import EventsExecutor
+        from rclpy.experimental.events_executor import EventsExecutor
     except ImportError:
         from rclpy.executors import SingleThreadedExecutor
 

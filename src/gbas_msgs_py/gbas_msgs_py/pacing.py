@@ -26,7 +26,7 @@ class Pacer:
         if window_epochs < 1:
             raise ValueError(f"window_epochs is {window_epochs}, expected 1 or more")
         self._window = window_epochs
-        self._sent: deque[int] = deque()
+        self._sent: deque[tuple[int, tuple[str, ...]]] = deque()
         self._progress: dict[str, int | None] = dict.fromkeys(wait_for)
         self.n_sent = 0
 
@@ -34,11 +34,12 @@ class Pacer:
         """Whether another epoch may be sent now."""
         return len(self._sent) < self._window
 
-    def sent(self, key: int) -> None:
-        """An epoch has been sent; keys must grow."""
+    def sent(self, key: int, readers: Sequence[str] | None = None) -> None:
+        """An epoch has been sent, of which `readers` (all, unless given) will report; keys must grow."""
+        names = tuple(self._progress) if readers is None else tuple(name for name in readers if name in self._progress)
         self.n_sent += 1
-        if self._progress:
-            self._sent.append(key)
+        if names:
+            self._sent.append((key, names))
 
     def on_progress(self, name: str, key: int) -> bool:
         """A reader has finished with all epochs up to `key`; True when that lets another epoch be sent."""
@@ -46,12 +47,8 @@ class Pacer:
             return False
         before = self._progress[name]
         self._progress[name] = key if before is None else max(before, key)
-        marks = [mark for mark in self._progress.values() if mark is not None]
-        if len(marks) < len(self._progress):
-            return False
         was_full = not self.may_send()
-        finished = min(marks)
-        while self._sent and self._sent[0] <= finished:
+        while self._sent and not self._awaited(*self._sent[0]):
             self._sent.popleft()
         return was_full and self.may_send()
 
@@ -63,10 +60,11 @@ class Pacer:
     @property
     def lagging(self) -> tuple[str, ...]:
         """Readers that have not finished with the oldest epoch under way."""
-        if not self._sent:
-            return ()
-        oldest = self._sent[0]
-        return tuple(name for name, mark in self._progress.items() if mark is None or mark < oldest)
+        return self._awaited(*self._sent[0]) if self._sent else ()
+
+    def _awaited(self, key: int, names: tuple[str, ...]) -> tuple[str, ...]:
+        marks = [(name, self._progress[name]) for name in names]
+        return tuple(name for name, mark in marks if mark is None or mark < key)
 
 
 class Playback:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from gbas_msgs_py.topics import CLOCK, DIAGNOSTICS, EPHEMERIS, EVENTS, PROGRESS_PREFIX, SCHEMAS
+from gbas_msgs_py.topics import AIRBORNE_EPHEMERIS, CLOCK, DIAGNOSTICS, EPHEMERIS, EVENTS, PROGRESS_PREFIX, SCHEMAS
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,6 +39,7 @@ STATUS: Final = Qos(depth=16)
 
 _BY_TOPIC: Final = {
     EPHEMERIS: EPHEMERIDES,
+    AIRBORNE_EPHEMERIS: EPHEMERIDES,
     SCHEMAS: SCHEMA_DICTIONARY,
     EVENTS: LOG,
     DIAGNOSTICS: STATUS,

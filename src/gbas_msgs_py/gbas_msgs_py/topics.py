@@ -26,6 +26,8 @@ GROUND_OBSERVATIONS: Final[tuple[str, ...]] = tuple(
 )
 GROUND_INTEGRITY: Final = "ground/integrity"
 AIRBORNE_OBSERVATIONS: Final = "airborne/observations"
+AIRBORNE_EPHEMERIS: Final = "airborne/ephemeris"
+"""What the aircraft received where that differs from the station: remap ``/gbas/ephemeris`` of its receiver to it."""
 AIRBORNE_SOLUTION: Final = "airborne/solution"
 AIRBORNE_PROTECTION: Final = "airborne/protection_levels"
 AIRBORNE_FIX: Final = "airborne/fix"
@@ -86,6 +88,7 @@ TOPICS: Final[tuple[TopicSpec, ...]] = (
     *(TopicSpec(name=n, message_type=_TABLE, schema="gbas/observations/1") for n in GROUND_OBSERVATIONS),
     TopicSpec(name=AIRBORNE_OBSERVATIONS, message_type=_TABLE, schema="gbas/observations/1"),
     TopicSpec(name=EPHEMERIS, message_type=_TABLE, schema="gbas/ephemeris/1", latched=True),
+    TopicSpec(name=AIRBORNE_EPHEMERIS, message_type=_TABLE, schema="gbas/ephemeris/1", latched=True),
     TopicSpec(name=GROUND_INTEGRITY, message_type=_TABLE, schema="gbas/integrity/1"),
     TopicSpec(name=VDB, message_type="std_msgs/msg/UInt8MultiArray", schema="gbas/vdb_burst/1"),
     TopicSpec(name=AIRBORNE_SOLUTION, message_type=_TABLE, schema="gbas/solution/1"),

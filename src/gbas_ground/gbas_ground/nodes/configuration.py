@@ -7,8 +7,9 @@ from typing import Any
 
 import yaml
 
-from gbas_ground.params import GroundParams, ParameterError, ground_section, parameter_specs
+from gbas_ground.params import GroundParams, ground_section, parameter_specs
 from gbas_msgs_py.node import GbasNode
+from gbas_msgs_py.parameters import ParameterError
 
 PREFIX = "ground."
 

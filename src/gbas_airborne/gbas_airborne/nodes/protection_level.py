@@ -1,0 +1,85 @@
+"""Node: position solutions in, protection levels, alert limits and the service out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from gbas_airborne.nodes.configuration import receiver_params
+from gbas_airborne.receiver import AirborneReceiver
+from gbas_airborne.service import ServiceState
+from gbas_msgs_py import tables, topics
+from gbas_msgs_py.events import Event, EventKind
+from gbas_msgs_py.node import GbasNode, NodeParams, run
+from gbas_msgs_py.records import ServiceType, SolutionEpoch
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProtectionLevelParams(NodeParams):
+    """Parameters of the node; those of the receiver are in the file and in ``airborne.*``.
+
+    Attributes
+    ----------
+    config : str
+        Receiver file.
+    """
+
+    config: str = ""
+
+
+class ProtectionLevel(GbasNode):
+    """Runs :meth:`AirborneReceiver.protect`; says that there is no service when solutions cease."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__("protection_level", ProtectionLevelParams, **kwargs)
+        self.receiver = receiver_params(self, self.params.config)
+        self.state = ServiceState()
+        self.service_told = int(ServiceType.NONE)
+        self.protection = self.table_publisher(topics.AIRBORNE_PROTECTION, tables.PROTECTION)
+        self.service = self.uint8_publisher(topics.AIRBORNE_SERVICE)
+        self.scalars = {
+            "vpl_m": self.float_publisher(topics.AIRBORNE_VPL),
+            "lpl_m": self.float_publisher(topics.AIRBORNE_LPL),
+            "val_m": self.float_publisher(topics.AIRBORNE_VAL),
+            "lal_m": self.float_publisher(topics.AIRBORNE_LAL),
+        }
+        self.table_subscription(topics.AIRBORNE_SOLUTION, tables.SOLUTION, self.on_solution)
+
+    def on_solution(self, solution: SolutionEpoch) -> None:
+        self.when_ready(partial(self.step, solution))
+
+    def step(self, solution: SolutionEpoch) -> None:
+        self.state, protection, events = AirborneReceiver.protect(self.state, solution, self.receiver)
+        self.protection.publish(protection)
+        for name, publish in self.scalars.items():
+            publish(getattr(protection, name))
+        self.service_told = int(protection.service)
+        self.service(self.service_told)
+        self.publish_events(events)
+        self.finished_epoch(solution.gps_week, solution.tow_s)
+
+    def due(self, now_s: float) -> float:
+        if self.service_told != ServiceType.NONE and self.silent_s(now_s) > self.params.silence_s:
+            self.withdraw()
+        return super().due(now_s)
+
+    def withdraw(self) -> None:
+        """Without solutions there is nothing to decide on, so nobody else will say that the service has ended."""
+        assert self.last_epoch is not None
+        week, tow_s = self.last_epoch
+        self.service_told = int(ServiceType.NONE)
+        self.service(self.service_told)
+        self.publish_events([
+            Event(gps_week=week, tow_s=tow_s, kind=EventKind.SERVICE, subject="approach", cause="no_solution",
+                  value=float(ServiceType.NONE), threshold=self.params.silence_s, source=self.get_name())
+        ])  # fmt: skip
+
+
+def main() -> None:
+    """Console script."""
+    run(ProtectionLevel)
+
+
+if __name__ == "__main__":
+    main()
