@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -145,13 +146,12 @@ def millisecond_step_m(code_change_m: FloatArray, carrier_change_m: FloatArray) 
     a slip on every satellite and restart every filter.
     """
     difference = code_change_m - carrier_change_m
+    stepped = np.abs(difference) > 0.5 * MILLISECOND_M
+    if np.count_nonzero(stepped) < _MIN_SATELLITES_FOR_STEP:
+        return 0.0
     present = difference[np.isfinite(difference)]
-    if present.size < _MIN_SATELLITES_FOR_STEP:
-        return 0.0
-    step = np.round(np.median(present) / MILLISECOND_M) * MILLISECOND_M
-    if step == 0.0 or not (np.abs(present - step) < _MILLISECOND_TOLERANCE_M).all():
-        return 0.0
-    return float(step)
+    step = float(np.round(np.median(present) / MILLISECOND_M) * MILLISECOND_M)
+    return step if (np.abs(present - step) < _MILLISECOND_TOLERANCE_M).all() else 0.0
 
 
 def ranging_sources(
@@ -222,7 +222,7 @@ def _rules(
     valid = np.isfinite(corrections.prc_m + corrections.rrc_mps + corrections.sigma_m)
     return [
         (Rejection.NOT_TRACKED, ~np.isfinite(ranges.smoothed_m)),
-        (Rejection.SYSTEM, ~satellites_of(params.systems)),
+        (Rejection.SYSTEM, ~_systems(params.systems)),
         (Rejection.NO_CORRECTION, ~np.isfinite(corrections.listed)),
         (Rejection.CORRECTION_INVALID, ~valid),
         (Rejection.CORRECTION_AGE, np.full(valid.shape, too_old)),
@@ -232,6 +232,11 @@ def _rules(
         (Rejection.EPHEMERIS_CRC_MISMATCH, ~(ephemeris_crc == checks.crc)),
         (Rejection.NOT_SETTLED, ~(ranges.settled_s >= params.settle_s)),
     ]
+
+
+@lru_cache(maxsize=8)
+def _systems(letters: str) -> BoolArray:
+    return satellites_of(letters)
 
 
 def usable_b_values(b_m: FloatArray, n_receivers: int, valid: BoolArray) -> BoolArray:

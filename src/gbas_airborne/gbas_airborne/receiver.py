@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
@@ -40,6 +41,8 @@ from gbas_msgs_py.vdb.ephemeris_crc import ephemeris_crcs
 
 # A time constant of zero means no smoothing; the filter wants a positive one.
 _NO_SMOOTHING_S: Final = 1e-9
+# Uncertain, ours: so many epochs refused in a row, each later than the one before, are the time now.
+RESTART_AFTER_REFUSED: Final = 10
 # Reasons that say nothing about a satellite itself: no event is made of them.
 _SILENT: Final = (Rejection.NO_STATION, Rejection.SYSTEM)
 
@@ -111,6 +114,8 @@ class PositionState:
         GPS time until which the range test holds a satellite [s]; -inf when it does not.
     observations_missing : bool
         Whether the last epoch had none.
+    refused, refused_key : int
+        Epochs refused in a row because they were not later than the last one, and the last of them.
     """
 
     epoch: tuple[int, float] | None = None
@@ -122,6 +127,8 @@ class PositionState:
     reason: NDArray[np.int64] = field(default_factory=lambda: np.full(len(SAT_IDS), int(Rejection.NOT_TRACKED)))
     held_until_s: FloatArray = field(default_factory=lambda: np.full(len(SAT_IDS), -np.inf))
     observations_missing: bool = False
+    refused: int = 0
+    refused_key: int = 0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -141,8 +148,8 @@ class AirborneReceiver:
     ) -> tuple[PositionState, SolutionEpoch, tuple[Event, ...]]:
         """Position of one epoch; without one, a solution whose scalars are NaN (but for what the station told).
 
-        An epoch that is not after the last one gives no position and changes nothing but what was received; one that is
-        further back than corrections may be old starts the receiver anew.
+        An epoch that is not later than the last one is refused: no position, and nothing changes but what was received.
+        When time goes on from there, the receiver starts anew.
         """
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             return _position(state, epoch, params)
@@ -169,21 +176,22 @@ def _position(
     state: PositionState, epoch: AirborneEpoch, params: AirborneParams
 ) -> tuple[PositionState, SolutionEpoch, tuple[Event, ...]]:
     log = _Log(epoch)
-    state, in_order = _in_order(state, epoch, params, log)
-    state = replace(state, ephemerides=_receive_ephemerides(state.ephemerides, epoch.ephemerides))
+    state, in_order = _in_order(state, epoch, log)
+    ephemerides = _receive_ephemerides(state.ephemerides, epoch.ephemerides)
     reception, events = reception_step(state.reception, epoch.bursts, epoch.gps_week, epoch.tow_s, params)
     log.events.extend(events)
-    state = replace(state, reception=reception)
+    state = replace(state, ephemerides=ephemerides, reception=reception)
     if not in_order:
         return state, _solution(epoch, reception, None), tuple(log.events)
-    state = replace(state, epoch=(epoch.gps_week, epoch.tow_s))
     observations = _observations(epoch)
+    if observations is None and not state.observations_missing:
+        log.add(EventKind.INPUT, "observations", "missing")
+    now = (epoch.gps_week, epoch.tow_s)
+    state = replace(state, epoch=now, refused=0, observations_missing=observations is None)
     if observations is None:
-        if not state.observations_missing:
-            log.add(EventKind.INPUT, "observations", "missing")
-        return replace(state, observations_missing=True), _solution(epoch, reception, None), tuple(log.events)
+        return state, _solution(epoch, reception, None), tuple(log.events)
     tracking, ranges = _track(state.tracking, observations, params)
-    state = replace(state, tracking=tracking, observations_missing=False)
+    state = replace(state, tracking=tracking)
     state, fix = _navigate(state, epoch, ranges, params, log)
     return state, _solution(epoch, reception, fix), tuple(log.events)
 
@@ -212,18 +220,18 @@ class _Log:
         )
 
 
-def _in_order(
-    state: PositionState, epoch: AirborneEpoch, params: AirborneParams, log: _Log
-) -> tuple[PositionState, bool]:
-    """Whether the epoch comes after the last one; a state that starts anew after a large step back."""
-    if state.epoch is None or epoch_key(epoch.gps_week, epoch.tow_s) > epoch_key(*state.epoch):
+def _in_order(state: PositionState, epoch: AirborneEpoch, log: _Log) -> tuple[PositionState, bool]:
+    """Whether the epoch comes after the last one; a state that starts anew when time goes on from an earlier one."""
+    key = epoch_key(epoch.gps_week, epoch.tow_s)
+    if state.epoch is None or key > epoch_key(*state.epoch):
         return state, True
     back_s = seconds_between(epoch.gps_week, epoch.tow_s, *state.epoch)
-    if back_s > params.correction_timeout_s:
-        log.add(EventKind.INPUT, "observations", "time_restart", back_s, params.correction_timeout_s)
+    refused = state.refused + 1 if state.refused and key > state.refused_key else 1
+    if refused >= RESTART_AFTER_REFUSED:
+        log.add(EventKind.INPUT, "observations", "time_restart", back_s)
         return PositionState(), True
     log.add(EventKind.INPUT, "observations", "time_backwards", back_s, 0.0)
-    return state, False
+    return replace(state, refused=refused, refused_key=key), False
 
 
 # --- inputs
@@ -269,6 +277,7 @@ def _track(
     state: TrackingState, observations: ObservationEpoch, params: AirborneParams
 ) -> tuple[TrackingState, SmoothedRanges]:
     """Smooth the L1 code; returns what a position can be made of."""
+    slip_params, smoothing_params = _filter_params(params)
     now = (observations.gps_week, observations.tow_s)
     dt_s = seconds_between(*state.observed, *now) if state.observed is not None else math.nan
     code = _finite(observations.code_m)
@@ -282,7 +291,7 @@ def _track(
         _finite(observations.doppler_hz)[np.newaxis],
         _finite(observations.lli)[np.newaxis],
         dt_s,
-        SlipParams(max_gap_s=params.max_gap_s, receiver_jerk_mps3=params.receiver_jerk_mps3),
+        slip_params,
     )
     smoothing, smoothed = smooth_step(
         state.smoothing,
@@ -290,12 +299,20 @@ def _track(
         carrier[L1],
         found.slipped[0, L1],
         dt_s,
-        SmoothingParams(tau_s=(max(params.smoothing_tau_s, _NO_SMOOTHING_S),), max_gap_s=params.max_gap_s),
+        smoothing_params,
     )
     state = TrackingState(
         observed=now, carrier_offset_m=state.carrier_offset_m + step, slips=slips, smoothing=smoothing
     )
     return state, SmoothedRanges(code_m=code[L1], smoothed_m=smoothed[0], settled_s=smoothing.elapsed_s)
+
+
+@lru_cache(maxsize=8)
+def _filter_params(params: AirborneParams) -> tuple[SlipParams, SmoothingParams]:
+    return (
+        SlipParams(max_gap_s=params.max_gap_s, receiver_jerk_mps3=params.receiver_jerk_mps3),
+        SmoothingParams(tau_s=(max(params.smoothing_tau_s, _NO_SMOOTHING_S),), max_gap_s=params.max_gap_s),
+    )
 
 
 def _finite(values: FloatArray) -> FloatArray:
@@ -317,7 +334,8 @@ def _navigate(
     )
     now_s = seconds_between(0, 0.0, epoch.gps_week, epoch.tow_s)
     held = (sources.reason == int(Rejection.NONE)) & (state.held_until_s > now_s)
-    sources = replace(sources, reason=np.where(held, int(Rejection.RANGE_TEST), sources.reason))
+    if held.any():
+        sources = replace(sources, reason=np.where(held, int(Rejection.RANGE_TEST), sources.reason))
     attempt = Attempt(fix=None, reason=sources.reason)
     if station is not None and corrections is not None:
         inputs = PositionInputs(sources=sources, corrections=corrections, station=station, approach=reception.approach)
@@ -325,15 +343,16 @@ def _navigate(
         attempt = tested_position(inputs, start, _speed(state, epoch, params), params)
     _report(state.reason, attempt, sources, reception, params, log)
     tripped = np.isfinite(attempt.range_error_m)
+    fix = attempt.fix
     state = replace(
         state,
         ephemerides=own,
         reason=attempt.reason,
         held_until_s=np.where(tripped, now_s + params.range_test_hold_s, state.held_until_s),
+        fix_epoch=(epoch.gps_week, epoch.tow_s) if fix is not None else state.fix_epoch,
+        fix_ecef_m=fix.position_m if fix is not None else state.fix_ecef_m,
     )
-    if attempt.fix is not None:
-        state = replace(state, fix_epoch=(epoch.gps_week, epoch.tow_s), fix_ecef_m=attempt.fix.position_m)
-    return state, attempt.fix
+    return state, fix
 
 
 def _speed(state: PositionState, epoch: AirborneEpoch, params: AirborneParams) -> Speed:

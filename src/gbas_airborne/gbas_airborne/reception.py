@@ -108,6 +108,8 @@ class ReceptionState:
         Station listened to; None before its station data.
     heard : (week, tow_s) or None
         Frame of the last good block of that station.
+    type2 : Type2 or None
+        The message `station` was made of.
     type1_received : (week, tow_s) or None
         Frame of the last complete set of corrections.
     """
@@ -115,6 +117,7 @@ class ReceptionState:
     station_id: str | None = None
     heard: tuple[int, float] | None = None
     station: StationData | None = None
+    type2: Type2 | None = None
     approach: FinalApproach | None = None
     corrections: Corrections | None = None
     type1_received: tuple[int, float] | None = None
@@ -213,8 +216,9 @@ class _Intake:
         elif isinstance(message, Type11):
             kept = tuple(m for m in self.state.type11 if m.modified_z_count_s == message.modified_z_count_s)
             self.state = replace(self.state, type11=(*kept[-1:], message))
-        if self.state.station_id == block.station_id:
-            self.state = replace(self.state, heard=(burst.gps_week, burst.tow_s))
+        heard = (burst.gps_week, burst.tow_s)
+        if self.state.station_id == block.station_id and self.state.heard != heard:
+            self.state = replace(self.state, heard=heard)
 
     # --- whose message, and may it be used
 
@@ -258,6 +262,8 @@ class _Intake:
         known = self.state.station_id
         if known is not None and station_id != known:
             self._forget("station_changed")
+        if known == station_id and message == self.state.type2:
+            return
         station = _station_data(message)
         old = self.state.station
         if old is not None and old.rsds != station.rsds:
@@ -267,7 +273,7 @@ class _Intake:
             self._event(EventKind.STATION, station_id, "station_selected", float(station.gcid))
         elif old.gcid != station.gcid:
             self._event(EventKind.STATION, station_id, "gcid_changed", float(station.gcid), float(old.gcid))
-        self.state = replace(self.state, station_id=station_id, station=station)
+        self.state = replace(self.state, station_id=station_id, station=station, type2=message)
 
     def _take_type1(self, message: Type1, burst: Burst) -> None:
         if message.measurement_type != L1_CA_MEASUREMENT:
@@ -275,8 +281,7 @@ class _Intake:
             return
         self._take_ephemeris_check(message)
         if message.additional_message_flag == 0:
-            self.count(unpaired=int(self.state.pending_pair is not None))
-            self.state = replace(self.state, pending_pair=None)
+            self._drop_pending()
             self._take_corrections(message.modified_z_count_s, message.measurements, burst)
             return
         pending = self.state.pending_pair
@@ -285,8 +290,14 @@ class _Intake:
             self.state = replace(self.state, pending_pair=None)
             self._take_corrections(message.modified_z_count_s, pending.measurements + message.measurements, burst)
             return
-        self.count(unpaired=int(pending is not None))
+        self._drop_pending()
         self.state = replace(self.state, pending_pair=message)
+
+    def _drop_pending(self) -> None:
+        """Half of a linked pair whose other half did not come is never used."""
+        if self.state.pending_pair is not None:
+            self.count(unpaired=1)
+            self.state = replace(self.state, pending_pair=None)
 
     def _take_ephemeris_check(self, message: Type1) -> None:
         if not message.measurements or message.ephemeris_crc is None:

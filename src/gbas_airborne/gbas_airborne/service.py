@@ -184,6 +184,8 @@ def _next_state(state: ServiceState, solution: SolutionEpoch, failure: Failure |
 def _events(
     old: ServiceState, new: ServiceState, solution: SolutionEpoch, failure: Failure | None
 ) -> tuple[Event, ...]:
+    if (old.state, old.service, old.cause) == (new.state, new.service, new.cause):
+        return ()
     found = failure or Failure(new.state, "protected", math.nan, math.nan)
 
     def event(kind: EventKind, subject: str, cause: str, value: float, threshold: float = math.nan) -> Event:
