@@ -529,6 +529,8 @@ class _Signals:
 
     The signals are blocked and awaited by a thread: a handler would run only once the executor returns to Python, and
     rclpy's own handlers end the context before anything pending can be published. A second signal ends at once.
+    Threads of libraries that were loaded before do not block them (those of BLAS); for what reaches these there is a
+    handler as well.
     """
 
     _AWAITED: Final = frozenset({signal.SIGINT, signal.SIGTERM})
@@ -537,15 +539,20 @@ class _Signals:
         self.stop = threading.Event()
         self.wake: Callable[[], Any] | None = None
         signal.pthread_sigmask(signal.SIG_BLOCK, self._AWAITED)
+        for number in self._AWAITED:
+            signal.signal(number, lambda *_: self._received())
         threading.Thread(target=self._await, name="signals", daemon=True).start()
 
     def _await(self) -> None:
         while True:
             signal.sigwait(self._AWAITED)
-            if self.stop.is_set() or self.wake is None:
-                os._exit(EXIT_OK if self.wake is None else 130)
-            self.stop.set()
-            self.wake()
+            self._received()
+
+    def _received(self) -> None:
+        if self.stop.is_set() or self.wake is None:
+            os._exit(EXIT_OK if self.wake is None else 130)
+        self.stop.set()
+        self.wake()
 
 
 __all__ = ["GbasNode", "NodeParams", "ParameterError", "TablePublisher", "require", "run", "serve"]
