@@ -75,15 +75,18 @@ class SlipParams:
     code_base_m, code_rate_mps : float
         Code test, ``base + rate T``: noise and multipath of two codes, divergence by the ionosphere [m, m/s].
     doppler_base_m, doppler_noise_mps : float
-        Doppler test, ``base + noise T + jerk T^3 / 12``: noise of two carriers, of the mean Doppler [m, m/s].
+        Doppler test, ``base + noise T + (satellite jerk + 2 receiver jerk) T^3 / 12``: noise of two carriers, of the
+        mean Doppler [m, m/s].
     rate_base_m : float
-        Rate test by extrapolation, ``base + jerk T^3``: noise of four carriers [m].
+        Rate test by extrapolation, ``base + (satellite jerk + 2 receiver jerk) T^3``: noise of four carriers [m].
     range_rate_mps : float
         Rate test with known ranges, ``base + rate T``: atmosphere, orbit and satellite clock [m/s].
     satellite_jerk_mps3 : float
         Change of a range acceleration by satellite motion, static receiver [m/s^3].
     receiver_jerk_mps3 : float
-        Jerk of the receiver; 0 on the ground, for an aircraft see :data:`NORMAL_MANOEUVRE_JERK_MPS3` [m/s^3].
+        Jerk of the receiver; 0 on the ground, for an aircraft see :data:`NORMAL_MANOEUVRE_JERK_MPS3` [m/s^3]. It counts
+        twice because satellites ahead and behind see it with opposite signs, and the median removed lies anywhere
+        between.
     geometry_free_base_m, geometry_free_rate_mps, geometry_free_acceleration_mps2 : float
         Geometry-free test, ``base + acceleration T^2`` against the last change, or ``base + rate T`` where there is
         none: noise, rate of the ionosphere in a storm, change of that rate [m, m/s, m/s^2].
@@ -219,8 +222,8 @@ def slip_step(
         history and stays sharp at long intervals. NaN for satellites without an ephemeris.
     los : (R, 3, N_SATS) array, optional
         Unit vectors to the satellites in any frame, good to a milliradian; NaN where unknown. With them the rate test
-        fits and removes the receiver's motion, and ``receiver_jerk_mps3`` no longer blunts it, as long as there are
-        two satellites more than the fit needs.
+        fits and removes the receiver's motion instead of allowing for ``receiver_jerk_mps3``, as long as there are two
+        satellites more than the fit needs.
 
     Returns
     -------
@@ -309,7 +312,7 @@ def _tests(
 ) -> tuple[CauseArray, FloatArray]:
     """Causes found by comparison with the past, and carrier rates [m/s] for the epochs to come."""
     code = np.abs(epoch.carrier_m - epoch.code_m) > params.code_base_m + params.code_rate_mps * dt_s
-    jerk_mps3 = params.satellite_jerk_mps3 + params.receiver_jerk_mps3
+    jerk_mps3 = params.satellite_jerk_mps3 + 2.0 * params.receiver_jerk_mps3
 
     beside_m = epoch.carrier_m - epoch.doppler_mps * epoch.dt_s
     beside_common_m, _ = _common(beside_m, params.min_satellites)
@@ -338,14 +341,15 @@ def _rate_test(
 ) -> tuple[BoolArray, BoolArray]:
     """Where a carrier left its extrapolation, and where that could be tested, both (R, N_BANDS, N_SATS)."""
     still_limit_m = params.rate_base_m + params.satellite_jerk_mps3 * dt_s**3
-    moving_limit_m = still_limit_m + params.receiver_jerk_mps3 * dt_s**3
+    moving_limit_m = still_limit_m + 2.0 * params.receiver_jerk_mps3 * dt_s**3
     found = enough & (np.abs(surprise_m) > moving_limit_m)
     tested = enough & np.isfinite(surprise_m)
     if los is not None:
         for receiver in range(len(surprise_m)):
             motionless = _without_motion(surprise_m[receiver], los[receiver], still_limit_m)
             if motionless is not None:
-                found[receiver] |= np.abs(motionless) > still_limit_m
+                fitted = ~np.isnan(motionless)
+                found[receiver][fitted] = np.abs(motionless[fitted]) > still_limit_m
     return found, tested
 
 
@@ -360,7 +364,8 @@ def _without_motion(surprise_m: FloatArray, los: FloatArray, limit_m: float) -> 
     satellite = np.nonzero(rows)[1]
     design = np.concatenate([-los, np.ones((1, los.shape[-1]))])[:, satellite].T
     value_m, kept = surprise_m[rows], np.ones(len(satellite), dtype=bool)
-    while np.unique(satellite[kept]).size >= _FIT_UNKNOWNS + 2:
+    needed = max(_FIT_UNKNOWNS + 2, 2 * np.unique(satellite).size / 3)
+    while np.unique(satellite[kept]).size >= needed:
         left, singular, right = np.linalg.svd(design[kept], full_matrices=False)
         if not singular[0] <= _FIT_MAX_CONDITION * singular[-1]:
             break
