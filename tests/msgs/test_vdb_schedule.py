@@ -7,6 +7,7 @@ from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -398,30 +399,30 @@ def test_when_all_ephemerides_change_at_once_all_are_sent_within_20_frames_and_e
         assert runs
 
 
-@given(data=st.data())
-@settings(max_examples=60, deadline=None)
-def test_no_satellite_waits_longer_than_20_frames_whatever_comes_and_goes(data: st.DataObject) -> None:
-    # Up to 14 satellites in one message, appearing, setting and changing at random: room for what is asked.
-    n_sources = data.draw(st.integers(1, 14))
-    state = dict.fromkeys(range(1, n_sources + 1), 0)
-    timeline: list[dict[int, object]] = []
-    for _ in range(80):
-        event = data.draw(st.integers(0, 12))
-        number = data.draw(st.integers(1, n_sources))
-        if event == 0:
-            state.pop(number, None)
-        elif event == 1:
-            state[number] = state.get(number, 0) + 1
-        timeline.append(dict(state))
-    firsts = run_rotation(lambda frame: timeline[frame], len(timeline))
+@pytest.mark.parametrize(("n_sources", "places"), [(12, 1), (18, 1), (36, 2)])
+@given(seed=st.integers(0, 2**32 - 1), rate=st.sampled_from([0.01, 0.05, 0.2]))
+@settings(max_examples=15, deadline=None)
+def test_no_satellite_waits_longer_than_20_frames_whatever_comes_and_goes(
+    n_sources: int, places: int, seed: int, rate: float
+) -> None:
+    # Satellites appear, set and change at random, now and then all at once.
+    random = np.random.default_rng(seed)
+    present = dict.fromkeys(range(n_sources), 0)
+    history: dict = {}  # type: ignore[type-arg]
     last: dict[int, int] = {}
-    for frame, chosen in enumerate(firsts):
-        for gone in [number for number in last if number not in timeline[frame]]:
-            del last[gone]
-        for number in timeline[frame]:
+    for frame in range(150):
+        if random.random() < rate:
+            present.pop(int(random.integers(n_sources)), None)
+        if random.random() < rate:
+            number = int(random.integers(n_sources))
+            present[number] = present.get(number, 0) + 1
+        if random.random() < 0.01:
+            present = {number: count + 1 for number, count in present.items()}
+        chosen, history = choose_first(history, dict(present), frame, places)
+        last = {number: since for number, since in last.items() if number in present}
+        for number in present:
             assert frame - last.setdefault(number, frame - 1) <= FRAMES_BETWEEN
-        for number in chosen:
-            last[number] = frame
+        last |= dict.fromkeys(chosen, frame)
 
 
 def test_fewer_messages_than_before_leave_one_run() -> None:
