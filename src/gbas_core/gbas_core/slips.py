@@ -7,13 +7,14 @@ filter starts anyway). The tests:
 - **gap**: the time since the last epoch is missing, not positive, or too long for a prediction.
 - **code**: carrier change against code change, a coarse net for large slips and for jumps of the code alone.
 - **Doppler**: carrier change against the integrated Doppler (trapezoid).
-- **rate**: carrier change against its own extrapolation and, where the caller knows the geometric range, against it.
+- **rate**: carrier change against its own extrapolation, and against the geometric range where the caller knows it.
 - **geometry-free**: change of the difference of two carriers, L1-L5 and L1-L2.
 
-- **rate**: carrier change against its own extrapolation and, where the caller knows the geometric range, against this.
-clock, mostly by whole milliseconds. A step that moves code and carrier together is no slip. A step of the code alone is
-caught by the code test on every satellite, unless the caller asks for the carriers to follow the code. Either way the
-receiver samples at another instant than its time tag says from then on, and the predictions allow for that.
+The Doppler and rate tests first remove what all satellites of a receiver have in common: its clock and, for a moving
+receiver whose lines of sight the caller knows, its motion. Receivers step their clock, mostly by whole milliseconds. A
+step that moves code and carrier together is no slip. A step of the code alone is caught by the code test on every
+satellite, unless the caller asks for the carriers to follow the code. Either way the receiver samples at another instant
+than its time tag says from then on, and the predictions allow for that.
 
 Arrays are (R, N_BANDS, N_SATS).
 
@@ -221,9 +222,9 @@ def slip_step(
         Geometric range minus satellite clock, where the receiver's position is known [m]; the rate test then needs no
         history and stays sharp at long intervals. NaN for satellites without an ephemeris.
     los : (R, 3, N_SATS) array, optional
-        Unit vectors to the satellites in any frame, good to a milliradian; NaN where unknown. With them the rate test
-        fits and removes the receiver's motion instead of allowing for ``receiver_jerk_mps3``, as long as there are two
-        satellites more than the fit needs.
+        Unit vectors to the satellites in any frame, good to a milliradian; NaN where unknown. With them the Doppler
+        and rate tests fit and remove the receiver's motion instead of allowing for ``receiver_jerk_mps3``, as long as
+        there are two satellites more than the fit needs.
 
     Returns
     -------
@@ -312,45 +313,44 @@ def _tests(
 ) -> tuple[CauseArray, FloatArray]:
     """Causes found by comparison with the past, and carrier rates [m/s] for the epochs to come."""
     code = np.abs(epoch.carrier_m - epoch.code_m) > params.code_base_m + params.code_rate_mps * dt_s
-    jerk_mps3 = params.satellite_jerk_mps3 + 2.0 * params.receiver_jerk_mps3
 
     beside_m = epoch.carrier_m - epoch.doppler_mps * epoch.dt_s
     beside_common_m, _ = _common(beside_m, params.min_satellites)
-    doppler_limit_m = params.doppler_base_m + params.doppler_noise_mps * dt_s + jerk_mps3 * dt_s**3 / 12.0
-    doppler = np.abs(beside_m - beside_common_m) > doppler_limit_m
+    still_m = params.doppler_base_m + params.doppler_noise_mps * dt_s
+    doppler = _apart(beside_m - beside_common_m, los, still_m, dt_s**3 / 12.0, params)
 
     ahead_m = epoch.carrier_m - epoch.predicted_mps * epoch.dt_s
     ahead_common_m, enough_ahead = _common(ahead_m, params.min_satellites)
-    rate, tested = _rate_test(ahead_m - ahead_common_m, enough_ahead, los, dt_s, params)
+    rate = enough_ahead & _apart(ahead_m - ahead_common_m, los, params.rate_base_m, dt_s**3, params)
 
     off_m = epoch.carrier_m - epoch.range_m
     off_common_m, enough_off = _common(off_m, params.min_satellites)
     rate |= enough_off & (np.abs(off_m - off_common_m) > params.rate_base_m + params.range_rate_mps * dt_s)
 
-    tested = tested | np.isfinite(beside_m) | (enough_off & np.isfinite(off_m))
-    apart = _geometry_free(epoch, state, tested & ~doppler & ~rate, dt_s, params)
+    tested = np.isfinite(beside_m) | (enough_ahead & np.isfinite(ahead_m)) | (enough_off & np.isfinite(off_m))
+    jumped = _geometry_free(epoch, state, tested & ~doppler & ~rate, dt_s, params)
     cause = _flag(code, SlipCause.CODE) | _flag(doppler, SlipCause.DOPPLER)
-    cause |= _flag(rate, SlipCause.RATE) | _flag(apart, SlipCause.GEOMETRY_FREE)
+    cause |= _flag(rate, SlipCause.RATE) | _flag(jumped, SlipCause.GEOMETRY_FREE)
     step_m = np.where(enough_ahead, ahead_common_m, beside_common_m)
     step_m = np.where(np.abs(step_m) > CLOCK_STEP_M, step_m, 0.0)
     return cause, (epoch.carrier_m - step_m) / epoch.dt_s
 
 
-def _rate_test(
-    surprise_m: FloatArray, enough: BoolArray, los: FloatArray | None, dt_s: float, params: SlipParams
-) -> tuple[BoolArray, BoolArray]:
-    """Where a carrier left its extrapolation, and where that could be tested, both (R, N_BANDS, N_SATS)."""
-    still_limit_m = params.rate_base_m + params.satellite_jerk_mps3 * dt_s**3
-    moving_limit_m = still_limit_m + 2.0 * params.receiver_jerk_mps3 * dt_s**3
-    found = enough & (np.abs(surprise_m) > moving_limit_m)
-    tested = enough & np.isfinite(surprise_m)
-    if los is not None:
-        for receiver in range(len(surprise_m)):
-            motionless = _without_motion(surprise_m[receiver], los[receiver], still_limit_m)
-            if motionless is not None:
-                fitted = ~np.isnan(motionless)
-                found[receiver][fitted] = np.abs(motionless[fitted]) > still_limit_m
-    return found, tested
+def _apart(
+    surprise_m: FloatArray, los: FloatArray | None, base_m: float, per_jerk_s3: float, params: SlipParams
+) -> BoolArray:
+    """Where a carrier left its prediction by more than noise and motion explain, (R, N_BANDS, N_SATS).
+
+    `per_jerk_s3` is how a jerk shows in the surprise.
+    """
+    still_m = base_m + params.satellite_jerk_mps3 * per_jerk_s3
+    found: BoolArray = np.abs(surprise_m) > still_m + 2.0 * params.receiver_jerk_mps3 * per_jerk_s3
+    for receiver, directions in enumerate(() if los is None else los):
+        motionless_m = _without_motion(surprise_m[receiver], directions, still_m)
+        if motionless_m is not None:
+            fitted = ~np.isnan(motionless_m)
+            found[receiver][fitted] = np.abs(motionless_m[fitted]) > still_m
+    return found
 
 
 def _without_motion(surprise_m: FloatArray, los: FloatArray, limit_m: float) -> FloatArray | None:
