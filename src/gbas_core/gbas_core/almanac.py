@@ -208,6 +208,9 @@ def _almanac(satellites: dict[int, dict[str, float]], near_week: int, name: str)
             column[prn - 1] = fields[field]
     for prn in satellites:
         columns["toa_week"][prn - 1] = resolve_week(int(columns["toa_week"][prn - 1]), near_week)
+    weeks = {int(columns["toa_week"][prn - 1]) for prn in satellites}
+    if max(weeks) - min(weeks) > 1:
+        raise AlmanacError(f"{name}: weeks {sorted(weeks)} in one almanac; expected neighbouring ones")
     week, tow_s = max((columns["toa_week"][prn - 1], columns["toa_tow_s"][prn - 1]) for prn in satellites)
     return Almanac(gps_week=int(week), tow_s=float(tow_s), **columns)
 

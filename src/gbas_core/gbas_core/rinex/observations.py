@@ -179,7 +179,7 @@ def read_observations(
     if header.signal_strength_unit != "DBHZ" and version < 3.0 and np.isfinite(arrays[_CN0]).any():
         notes.append("signal strengths are in the receiver's own unit (no SIGNAL STRENGTH UNIT DBHZ) and left out")
         arrays[_CN0][:] = np.nan
-    _note_early_end(header, epochs.keys, notes)
+    _note_early_end(path, header, epochs.keys, notes)
     week, milliseconds = np.divmod(epochs.keys, MILLISECONDS_PER_WEEK)
     tow_s = milliseconds / 1000.0
     for array in (*arrays, week, tow_s):
@@ -250,10 +250,12 @@ def _check_time_scale(path: Path, header: Any) -> None:
         raise RinexError(path, f"TIME OF FIRST OBS: time scale {scale}; expected GPS or Galileo time")
 
 
-def _seconds(calendar: Any) -> tuple[int, float]:
-    return gps_from_calendar(
-        calendar.year, calendar.month, calendar.day, calendar.hour, calendar.minute, calendar.second
-    )
+def _seconds(path: Path, calendar: Any) -> tuple[int, float]:
+    t = calendar
+    try:
+        return gps_from_calendar(t.year, t.month, t.day, t.hour, t.minute, t.second)
+    except ValueError as error:
+        raise RinexError(path, f"epoch {calendar}: {error}") from error
 
 
 def _text(time: tuple[int, float]) -> str:
@@ -279,7 +281,7 @@ class _Epochs:
         for index, item in enumerate(parsed_epochs):
             if item.epoch is None:
                 continue
-            week, tow_s = _seconds(item.epoch)
+            week, tow_s = _seconds(path, item.epoch)
             key = epoch_key(week, tow_s)
             if item.flag == _CYCLE_SLIP_FLAG:
                 slips += [(key, satellite) for satellite in item.cycle_slip_satellites]
@@ -401,11 +403,11 @@ def _with_bit_0(lli: FloatArray, carrier_m: FloatArray) -> FloatArray:
     return np.where(np.isfinite(carrier_m), set_bit, lli)
 
 
-def _note_early_end(header: Any, keys: IntArray, notes: list[str]) -> None:
+def _note_early_end(path: Path, header: Any, keys: IntArray, notes: list[str]) -> None:
     """Tell of a file that was cut between two epochs: its header says when it should end."""
     if header.time_of_last_obs is None:
         return
-    stated, last = epoch_key(*_seconds(header.time_of_last_obs[0])), int(keys[-1])
+    stated, last = epoch_key(*_seconds(path, header.time_of_last_obs[0])), int(keys[-1])
     if stated > last:
         notes.append(f"ends at {_text(from_epoch_key(last))}, its header says {_text(from_epoch_key(stated))}")
 
