@@ -13,8 +13,8 @@ filter starts anyway). The tests:
 The Doppler and rate tests first remove what all satellites of a receiver have in common: its clock and, for a moving
 receiver whose lines of sight the caller knows, its motion. Receivers step their clock, mostly by whole milliseconds. A
 step that moves code and carrier together is no slip. A step of the code alone is caught by the code test on every
-satellite, unless the caller asks for the carriers to follow the code. Either way the receiver samples at another instant
-than its time tag says from then on, and the predictions allow for that.
+satellite, unless the caller asks for the carriers to follow the code. Either way the receiver samples at another
+instant than its time tag says from then on, and the predictions allow for that.
 
 Arrays are (R, N_BANDS, N_SATS).
 
