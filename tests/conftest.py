@@ -1,4 +1,4 @@
-"""What all tests share: where the recorded data are."""
+"""What all tests share: where the recorded data are, and how hypothesis behaves."""
 
 from __future__ import annotations
 
@@ -6,6 +6,11 @@ import os
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+# A busy machine must not turn a slow example into a failure.
+settings.register_profile("suite", deadline=None)
+settings.load_profile("suite")
 
 
 @pytest.fixture(scope="session")

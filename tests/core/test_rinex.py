@@ -364,6 +364,15 @@ def test_epochs_that_go_back_are_left_out(tmp_path: Path, mosaic_text: str) -> N
     assert "2 epochs are not later than the one before and were left out" in read.notes
 
 
+def test_the_interval_is_that_of_the_epochs(tmp_path: Path, mosaic_text: str) -> None:
+    head, *blocks = mosaic_text.split(">")
+    thinned = read_observations(written(tmp_path, ">".join([head, *blocks[::5]])))
+    assert thinned.interval_s == 5.0
+    assert "epochs are 5 s apart, though the header says 1 s" in thinned.notes
+    single = read_observations(written(tmp_path, ">".join([head, blocks[0]])))
+    assert (len(single), single.interval_s) == (1, 1.0)
+
+
 def test_odd_time_tags_are_rounded_and_said(tmp_path: Path, mosaic_text: str) -> None:
     odd = mosaic_text.replace("2024 06 24 08 20  3.0000000", "2024 06 24 08 20  2.9998000", 1)
     read = read_observations(written(tmp_path, odd))

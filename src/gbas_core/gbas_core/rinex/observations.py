@@ -35,6 +35,7 @@ _CODE, _CARRIER, _DOPPLER, _CN0, _LLI = range(5)
 _QUANTITY_LETTERS: Final = "CLDS"
 _GPS_SCALES: Final = ("GPST", "GST")  # Galileo time equals GPS time within tens of nanoseconds
 _TAG_TOLERANCE_S: Final = 1e-6
+_INTERVAL_TOLERANCE_S: Final = 0.001
 _OBSERVED_FLAGS: Final = (0, 1)
 _POWER_FAILURE_FLAG: Final = 1
 _CYCLE_SLIP_FLAG: Final = 6
@@ -69,7 +70,7 @@ class ObservationFile:
     antenna_delta_hen_m : (3,) array or None
         Antenna reference point above the marker: height, east, north [m].
     interval_s : float or None
-        Header's interval, else the median spacing of the epochs, else (a single epoch) None [s].
+        Median spacing of the epochs; of a single epoch what the header says, or None [s].
     gps_week : (E,) int array
     tow_s : (E,) array
         Receiver's time tags in GPS time, rounded to the millisecond [s].
@@ -190,7 +191,7 @@ def read_observations(
         marker=header.marker_name or path.name,
         approx_position_m=approx_position_m if approx_position_m is not None and approx_position_m.any() else None,
         antenna_delta_hen_m=_vector(header.antenna_delta_hen_m),
-        interval_s=header.interval_s or _median_spacing_s(epochs.keys),
+        interval_s=_interval_s(header, epochs.keys, notes),
         gps_week=week,
         tow_s=tow_s,
         code_m=arrays[_CODE],
@@ -416,5 +417,10 @@ def _vector(value: Any) -> FloatArray | None:
     return None if value is None else np.asarray(value, dtype=np.float64)
 
 
-def _median_spacing_s(keys: IntArray) -> float | None:
-    return float(np.median(np.diff(keys))) / 1000.0 if len(keys) > 1 else None
+def _interval_s(header: Any, keys: IntArray, notes: list[str]) -> float | None:
+    if len(keys) < 2:
+        return header.interval_s or None
+    spacing_s = float(np.median(np.diff(keys))) / 1000.0
+    if header.interval_s and abs(header.interval_s - spacing_s) > _INTERVAL_TOLERANCE_S:
+        notes.append(f"epochs are {spacing_s:g} s apart, though the header says {header.interval_s:g} s")
+    return spacing_s
