@@ -214,6 +214,10 @@ class World:
         Where the satellites are.
     satellites : list of int
         Satellites seen and corrected.
+    amend : callable
+        Changes a correction (correction, satellite index, time), or leaves it out (None).
+    code_error_m : callable
+        Error of the aircraft's codes at a time, on the satellite axis [m].
     troposphere : bool
         Whether there is air between the station's height and the aircraft's.
     """
@@ -231,6 +235,7 @@ class World:
     b_values_m: Callable[[int], tuple[float, float, float, float]] | None = None
     station_message: Type2 | None = None
     approaches: tuple[FasDataSet, ...] = ()
+    amend: Callable[[Correction100, int, float], Correction100 | None] = field(default=lambda c, satellite, t: c)
     code_error_m: Callable[[float], np.ndarray] = field(default=lambda t: np.zeros(N_SATS))
     troposphere: bool = True
     clock_m: Callable[[float], float] = field(default=lambda t: 1234.5 + 0.3 * t)
@@ -311,10 +316,15 @@ class World:
             b_values_m=self.b_values_m(satellite) if self.b_values_m else values,
         )
 
+    def amended(self, satellite: int, t: float) -> Correction100 | None:
+        """The correction as sent: what `amend` makes of it, None to leave it out."""
+        return self.amend(self.correction(satellite, t), satellite, t)
+
     def type1(self, t: float, *, z_count_s: float | None = None) -> list[Type1]:
         """Type 1 message or linked pair; the first satellite rotates from frame to frame."""
         turn = round(2.0 * t) % max(len(self.satellites), 1)
         order = self.satellites[turn:] + self.satellites[:turn]
+        order = [satellite for satellite in order if self.amended(satellite, t) is not None]
         crcs = ephemeris_crcs(self.station)
         parts = [order[k : k + MEASUREMENTS_PER_MESSAGE] for k in range(0, len(order), MEASUREMENTS_PER_MESSAGE)]
         parts = parts or [[]]
@@ -325,7 +335,7 @@ class World:
                 additional_message_flag=flag,
                 ephemeris_decorrelation=self.p if part else math.nan,
                 ephemeris_crc=int(crcs[part[0]]) if part else None,
-                measurements=tuple(self.correction(satellite, t) for satellite in part),
+                measurements=tuple(self.amended(satellite, t) for satellite in part),
             )
             for flag, part in zip(flags, parts, strict=True)
         ]
