@@ -23,6 +23,7 @@ from gbas_core.smoothing import SmoothingParams, SmoothingState, initial_smoothi
 from gbas_ground.corrections import BoolArray
 from gbas_ground.params import GroundParams
 
+_MAX_LLI: Final = 9  # one decimal digit in RINEX
 _NO_SMOOTHING_TAU_S: Final = 1e-9  # far below any interval: the filter's weight is 1 and its output the raw code
 
 
@@ -46,6 +47,7 @@ def stack(observations: Sequence[ObservationEpoch | None], satellites: BoolArray
         values = np.stack([nothing if each is None else getattr(each, name) for each in observations])
         arrays.append(np.where(np.isfinite(values) & satellites, values, np.nan))
     code, carrier, doppler, cn0, lli = arrays
+    lli = np.where((lli < 0.0) | (lli > _MAX_LLI), 1.0, lli)  # an indicator that means nothing counts as lock lost
     present = np.array([each is not None for each in observations])
     return RawEpoch(code, carrier, doppler, cn0, lli, present)
 

@@ -1,0 +1,64 @@
+"""Latches: what sets them, what opens them, and what does not count."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gbas_ground.causes import FIRST_LATCHED, ExclusionCause
+from gbas_ground.executive import advance, exclude, initial_latch, release
+
+YES, NO = np.array([True]), np.array([False])
+
+
+def held(passes, dt_s=0.5, readmission_s=2.0, max_gap_s=3.5):
+    """Epochs a thing is excluded for, given what its monitors say after the epoch that failed."""
+    latch = exclude(initial_latch(1), YES, ExclusionCause.B_VALUE)
+    latch = advance(latch, NO, dt_s, max_gap_s)
+    epochs = 1
+    for passed in passes:
+        latch, _ = release(latch, readmission_s)
+        if not latch.excluded[0]:
+            return epochs
+        epochs += 1
+        latch = advance(latch, np.array([passed]), dt_s, max_gap_s)
+    return epochs
+
+
+def test_readmission_time_counts_from_the_last_failure():
+    # failed at 0; passes at 0.5, 1.0, 1.5, 2.0: clear for 2 s, so back in use at 2.5, the sixth epoch
+    assert held([True] * 20) == 5
+    assert held([True, True, False] + [True] * 20) == 8
+
+
+def test_unknown_does_not_count():
+    assert held([False] * 50) == 51
+
+
+@pytest.mark.parametrize("dt_s", [float("nan"), 0.0, -1.0, 100.0])
+def test_gaps_do_not_count(dt_s):
+    assert held([True] * 50, dt_s=dt_s) == 51
+
+
+def test_first_cause_stays():
+    latch = exclude(initial_latch(2), np.array([True, False]), ExclusionCause.PRC_LIMIT)
+    latch = advance(latch, np.array([True, True]), 0.5, 3.5)
+    assert latch.clear_s.tolist() == [0.5, 0.0]
+    latch = exclude(latch, np.array([True, True]), ExclusionCause.B_VALUE)
+    assert latch.cause.tolist() == [ExclusionCause.PRC_LIMIT, ExclusionCause.B_VALUE]
+    assert latch.clear_s.tolist() == [0.0, 0.0]
+
+
+def test_release_tells_what_ended():
+    latch = exclude(initial_latch(3), np.array([True, True, False]), ExclusionCause.B_VALUE)
+    latch = advance(latch, np.array([True, False, True]), 2.0, 3.5)
+    latch, ended = release(latch, 2.0)
+    assert ended.tolist() == [True, False, False]
+    assert latch.excluded.tolist() == [False, True, False]
+
+
+def test_causes_are_words_and_latched_ones_are_told_apart():
+    assert ExclusionCause.B_VALUE.word == "b_value"
+    assert all((cause >= FIRST_LATCHED) == (cause.name in {
+        "B_VALUE", "RECEIVER_FAULT", "PRC_LIMIT", "RRC_LIMIT", "RANGE_RESIDUAL", "SIGNAL_POWER"
+    }) for cause in ExclusionCause)  # fmt: skip
