@@ -8,9 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from recorded_sets import recorded_sets, request, truth_ecef_m, truth_of_rows
-from rtklib_dgnss import rtklib_positions
-from weighted_dgnss import dgnss_position, read_ranges
 
 from gbas_bringup.process import ProcessResult, prepare, process
 from gbas_bringup.results import Row, error_statistics
@@ -18,6 +15,9 @@ from gbas_core.frames import geodetic_from_ecef, rot_enu_ecef
 from gbas_core.gpstime import epoch_key
 from gbas_core.satellites import SAT_IDS
 from gbas_studies.chain import AirborneOutput
+from recorded_sets import recorded_sets, request, truth_ecef_m, truth_of_rows
+from rtklib_dgnss import rtklib_positions
+from weighted_dgnss import dgnss_position, read_ranges
 
 # Epochs until a filter of 100 s has settled (200 s after the first epoch on the ground) and the ephemeris CRCs of at
 # least four satellites have come round: no solution can be expected before.
