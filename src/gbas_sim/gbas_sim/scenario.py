@@ -34,7 +34,13 @@ from gbas_sim.flight import StraightIn
 from gbas_sim.receivers import AIRBORNE_RECEIVER, GROUND_RECEIVER, ReceiverParams
 from gbas_sim.world import WorldParams
 
-_WORLD_KEYS: Final[dict[str, type]] = {"systems": str, "start_week": int, "start_tow_s": float, "interval_s": float, "seed": int}
+_WORLD_KEYS: Final[dict[str, type]] = {
+    "systems": str,
+    "start_week": int,
+    "start_tow_s": float,
+    "interval_s": float,
+    "seed": int,
+}
 _RECEIVERS: Final = {"ground_receiver": GROUND_RECEIVER, "airborne_receiver": AIRBORNE_RECEIVER}
 
 
@@ -48,7 +54,18 @@ def scenario_from_yaml(path: str | Path) -> WorldParams:
     Raises
     ------
     ScenarioError
-        As :func:`scenario_from_mapping`, and when the file cannot be read or is not YAML.
+        As :func:`read_sections` and :func:`scenario_from_mapping`.
+    """
+    return scenario_from_mapping(read_sections(path), source=str(path))
+
+
+def read_sections(path: str | Path) -> Mapping[str, Any]:
+    """Sections of a ROS parameter file (``/**: ros__parameters:``) or of a plain one.
+
+    Raises
+    ------
+    ScenarioError
+        When the file cannot be read, is not YAML, or holds no sections.
     """
     try:
         document = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
@@ -61,7 +78,7 @@ def scenario_from_yaml(path: str | Path) -> WorldParams:
             document = document[key]
     if not isinstance(document, Mapping):
         raise ScenarioError(f"{path}: holds no parameters")
-    return scenario_from_mapping(document, source=str(path))
+    return document
 
 
 def scenario_from_mapping(mapping: Mapping[str, Any], *, source: str = "parameters") -> WorldParams:
@@ -79,6 +96,20 @@ def scenario_from_mapping(mapping: Mapping[str, Any], *, source: str = "paramete
         raise ScenarioError(f"{source}: {error}") from None
 
 
+def scenario_values(world: WorldParams) -> dict[str, Any]:
+    """Every key under ``sim`` but the approach's name, with the value in use, in the file's units."""
+    values: dict[str, Any] = {f"sim.{key}": getattr(world, key) for key in _WORLD_KEYS}
+    for item in fields(StraightIn):
+        if item.name != "approach":
+            values[f"sim.flight.{item.name}"] = getattr(world.flight, item.name)
+    for name, receiver in (("ground_receiver", world.ground), ("airborne_receiver", world.airborne)):
+        for item in fields(receiver):
+            values[f"sim.{name}.{item.name}"] = getattr(receiver, item.name)
+        mask_rad = values.pop(f"sim.{name}.elevation_mask_rad")
+        values[f"sim.{name}.elevation_mask_deg"] = math.degrees(mask_rad)
+    return values
+
+
 def _flatten(mapping: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     flat: dict[str, Any] = {}
     for key, value in mapping.items():
@@ -94,6 +125,8 @@ def _section(flat: Mapping[str, Any], prefix: str) -> dict[str, Any]:
 
 
 def _world(ground: dict[str, Any], sim: dict[str, Any]) -> WorldParams:
+    if not ground:
+        raise ValueError("section 'ground' is missing: there is no site")
     parts = {name: _section(sim, f"{name}.") for name in ("flight", *_RECEIVERS)}
     approach = _approach(ground, sim.get("approach"))
     plain = {key: value for key, value in sim.items() if key.partition(".")[0] not in parts and key != "approach"}
