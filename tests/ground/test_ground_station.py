@@ -483,9 +483,10 @@ def test_time_that_stays_in_the_past_is_believed_in_the_end():
     """A player that loops, or one epoch with a date far in the future: the station starts anew after some epochs."""
     world, station = truth(2), params(2)
     out = run(world, station, [*half_seconds(20), 80_000.0])
-    again = run(world, station, half_seconds(40, first=10.0), state=out.state)
+    again = run(world, station, half_seconds(40, first=10.0), state=out.state, ephemerides={})
     assert len(again.told("epoch_not_later")) == RESTART_AFTER_REFUSED - 1
     assert again.told("restarted") == [(10.0 + 0.5 * (RESTART_AFTER_REFUSED - 1), "station", "station")]
+    assert usable(again.integrity[-1]).sum() > 20
 
 
 def test_observation_of_another_epoch_does_not_count():

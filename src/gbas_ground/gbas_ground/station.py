@@ -250,7 +250,8 @@ def _admit(state: MonitorState, epoch: GroundEpoch, params: GroundParams, events
         return replace(state, refused=0)
     if _refused(state, epoch) >= RESTART_AFTER_REFUSED:
         events.add(EventKind.STATION, "station", "restarted", (key - state.key) / 1000.0)
-        return initial_monitor_state(params)
+        # what was received stays true; it is not sent again
+        return replace(initial_monitor_state(params), ephemerides=state.ephemerides)
     events.add(EventKind.INPUT, "station", "epoch_not_later", (key - state.key) / 1000.0, 0.0)
     return None
 
@@ -446,7 +447,8 @@ def _satellite_events(
             cause = ExclusionCause(int(state.causes[satellite]))
             events.add(EventKind.READMISSION, subject, cause.word)
         elif subject not in told:
-            events.add(EventKind.EXCLUSION, subject, ExclusionCause(int(condition.cause[satellite])).word)
+            cause = ExclusionCause(int(condition.cause[satellite])) or ExclusionCause.NOT_TRACKED
+            events.add(EventKind.EXCLUSION, subject, cause.word)
     if serving != state.serving:
         events.add(
             EventKind.STATION, "station", "corrections_begin" if serving else "corrections_end", float(now.sum())
