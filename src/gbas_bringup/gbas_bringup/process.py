@@ -15,8 +15,6 @@ from gbas_bringup.errors import ConfigError, GbasError
 from gbas_bringup.resources import config_path
 from gbas_bringup.results import Row, summarise, write_json, write_solution_csv
 from gbas_core.frames import geodetic_from_ecef
-from gbas_core.gpstime import from_epoch_key
-from gbas_core.observations import ObservationEpoch
 from gbas_core.recording import RecordedEpoch, Recording
 from gbas_ground.params import GroundParams, ground_section
 from gbas_msgs_py.events import Event, EventKind
@@ -269,10 +267,3 @@ def _airborne_params(
     except ValueError as error:
         raise ConfigError(request.airborne or "gbas process", str(error)) from None
 
-
-def observation_or_empty(observation: ObservationEpoch | None, key: int) -> ObservationEpoch:
-    """The observations of an epoch, or an epoch without any: what the replay node sends when a receiver has no data."""
-    if observation is not None:
-        return observation
-    week, tow_s = from_epoch_key(key)
-    return ObservationEpoch(gps_week=week, tow_s=tow_s)

@@ -94,7 +94,7 @@ class Chain:
             GroundEpoch(
                 gps_week=week,
                 tow_s=tow_s,
-                observations=epoch.ground,
+                observations=tuple(_or_none(seen) for seen in epoch.ground),
                 ephemerides=self._ground_ephemerides.take(epoch.key),
             ),
             self._ground_params,
@@ -109,7 +109,7 @@ class Chain:
             AirborneEpoch(
                 gps_week=week,
                 tow_s=tow_s,
-                observations=joined.item,
+                observations=_or_none(joined.item),
                 bursts=joined.bursts,
                 ephemerides=self._airborne_ephemerides.take(joined.key),
             ),
@@ -123,3 +123,8 @@ def _queue(ephemerides: Iterable[Ephemeris]) -> ReceptionQueue[Ephemeris]:
     for ephemeris in ephemerides:
         queue.add(epoch_key(ephemeris.gps_week, ephemeris.tow_s), ephemeris)
     return queue
+
+
+def _or_none(observations: ObservationEpoch | None) -> ObservationEpoch | None:
+    """Observations without a single value are no observations."""
+    return None if observations is None or observations.empty else observations
