@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -125,7 +125,8 @@ def prepare(request: ProcessRequest) -> Prepared:
     """
     if request.ground_xyz_m and len(request.ground_xyz_m) != len(request.ground):
         raise GbasError(
-            f"--ground-xyz: {len(request.ground_xyz_m)} positions for {len(request.ground)} ground files; expected one each"
+            f"--ground-xyz: {len(request.ground_xyz_m)} positions for {len(request.ground)} ground files; "
+            "expected one each"
         )
     recording = Recording.open(
         request.ground, request.user, request.navigation, user_navigation=request.user_navigation
@@ -142,7 +143,7 @@ def process(request: ProcessRequest, *, progress: Progress | None = None) -> Pro
     epochs = prepared.epochs()
     outputs: list[AirborneOutput] = []
     events: list[Event] = []
-    for done, output in enumerate(prepared.chain().run(_counted(epochs, progress))):
+    for output in prepared.chain().run(_counted(epochs, progress)):
         events += output.events
         if isinstance(output, AirborneOutput):
             outputs.append(output)
@@ -166,7 +167,7 @@ def write_results(result: ProcessResult, out: Path) -> dict[str, Any]:
     return summary
 
 
-def _counted(epochs: Sequence[RecordedEpoch], progress: Progress | None) -> Any:
+def _counted(epochs: Sequence[RecordedEpoch], progress: Progress | None) -> Iterator[RecordedEpoch]:
     for done, epoch in enumerate(epochs, start=1):
         yield epoch
         if progress is not None:
