@@ -37,6 +37,17 @@ def test_a_site_alone_is_a_scenario():
     assert world.receiver_ecef_m[1] == (3840835.113, 714861.969, 5024848.587)
     assert math.degrees(world.flight.approach.gpa_rad) == pytest.approx(3.0)
     assert world.systems == "GE"
+    assert world.troposphere.refractivity == 0.0
+
+
+def test_the_air_is_the_stations_unless_told_otherwise():
+    station = site()
+    station["ground"]["atmosphere"] = {"refractivity": 379.0, "scale_height_m": 8000, "refractivity_uncertainty": 20.0}
+    station["ground"]["station"]["height_m"] = 130.0
+    air = scenario_from_mapping(station).troposphere
+    assert (air.refractivity, air.scale_height_m, air.reference_height_m) == (379.0, 8000.0, 130.0)
+    other = scenario_from_mapping({**station, "sim.troposphere.refractivity": 300.0}).troposphere
+    assert (other.refractivity, other.scale_height_m) == (300.0, 8000.0)
 
 
 def test_everything_under_sim_is_read():
@@ -107,6 +118,8 @@ def test_dotted_keys_and_files_say_the_same(tmp_path):
         ),
         ({"airborne_receiver": {"spacing_chips": [0.1]}}, r"sim\.airborne_receiver: .* is not two numbers"),
         ({"airborne_receiver": {"elevation_mask_rad": 0.1}}, r"elevation_mask_rad is unknown"),
+        ({"troposphere": {"humidity": 1.0}}, r"sim\.troposphere\.humidity is unknown"),
+        ({"troposphere": {"refractivity": -1.0}}, r"troposphere: refractivity = -1\.0 is not within"),
         ({"approach": "rwy08"}, r"sim\.approach = 'rwy08' is not one of rwy26"),
     ],
 )

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from gbas_core.approach import FinalApproach
+from gbas_core.error_models import tropo_correction_m
 from gbas_core.frames import ecef_from_geodetic, rot_enu_ecef
 from gbas_core.gpstime import from_epoch_key
 from gbas_core.orbits import predicted_state, rotated_range, satellite_clock_s, transmit_state
@@ -16,6 +17,7 @@ from gbas_core.satellites import IS_GALILEO, IS_GPS, N_SATS
 from gbas_core.signals import BANDS, L1, L2, L5, SPEED_OF_LIGHT_MPS, WAVELENGTH_M
 from gbas_sim.flight import StraightIn
 from gbas_sim.receivers import AIRBORNE_RECEIVER, GROUND_RECEIVER, ReceiverParams, cn0_dbhz, noise_sigmas
+from gbas_sim.troposphere import Troposphere
 from gbas_sim.world import SimulatedEpoch, World, WorldParams
 
 SITES = (
@@ -177,6 +179,43 @@ def test_truth_is_where_the_airborne_ranges_meet(silent):
     assert along.vertical_m == pytest.approx(0.0, abs=1e-6)
     assert np.linalg.norm(epoch.truth.velocity_mps) == pytest.approx(70.0, abs=1e-9)
     assert (epoch.truth.gps_week, epoch.truth.tow_s) == from_epoch_key(epoch.key) == (2400, 216_450.0)
+
+
+# --- troposphere
+
+
+def test_troposphere_between_two_heights_is_what_the_airborne_correction_says():
+    # The correction is the standard's formula, written elsewhere and tested against published values there.
+    air = Troposphere(refractivity=379.0, scale_height_m=7900.0, reference_height_m=130.0)
+    elevation = np.full(N_SATS, np.nan)
+    elevation[:4] = np.radians([5.0, 20.0, 50.0, 90.0])
+    low, high = air.delay_m(np.array([130.0, 1130.0]), elevation)
+    expected = tropo_correction_m(379.0, 7900.0, elevation, 1000.0)
+    np.testing.assert_allclose((low - high)[:4], expected[:4], rtol=1e-12)
+    # 379e-6 x 7900 m = 2.994 m at the zenith; 1 / sin(20 deg) = 2.924 times that, less a little, at 20 degrees.
+    assert low[3] == pytest.approx(2.994 / math.sqrt(1.002), abs=1e-3)
+    assert low[1] == pytest.approx(2.994 * 2.924, rel=0.01)
+    assert not np.isfinite(low[4:]).any()
+
+
+def test_troposphere_delays_code_and_carrier_alike(silent):
+    air = Troposphere(refractivity=379.0, reference_height_m=130.0)
+    wet = World(dataclasses.replace(silent.params, troposphere=air))
+    for number in (0, 900):
+        with_air, without = wet.epoch(number).airborne, silent.epoch(number).airborne
+        delay = with_air.code_m - without.code_m
+        known = np.isfinite(delay)
+        np.testing.assert_allclose((with_air.carrier_m - without.carrier_m)[known], delay[known], rtol=0.0, atol=1e-6)
+        assert (delay[known] > 2.0).all()  # 3 m at the zenith, 1 km up at most
+        assert (delay[known] < 50.0).all()
+        # The Doppler has the rate of the delay since the epoch before; over the next it differs by 0.1 mm/s.
+        after = wet.epoch(number + 1).airborne.carrier_m - silent.epoch(number + 1).airborne.carrier_m
+        rate = (after - (with_air.carrier_m - without.carrier_m)) / 0.5
+        doppler = with_air.doppler_hz - without.doppler_hz
+        both = known & np.isfinite(rate)
+        np.testing.assert_allclose(
+            doppler[both], (-rate / WAVELENGTH_M[:, np.newaxis])[both], rtol=0.0, atol=1e-4 / WAVELENGTH_M[L1]
+        )
 
 
 # --- flight
@@ -377,6 +416,7 @@ def test_bad_world(changes, message):
             lambda: StraightIn(approach=APPROACH, intercept_distance_m=500.0, pushover_time_s=60.0),
             "flight: pushover_time_s = 60.0 is more than the descent",
         ),
+        (lambda: Troposphere(refractivity=900.0), "troposphere: refractivity = 900.0 is not within 0 to 800"),
         (lambda: ReceiverParams(noise_scale=-1.0), "receiver: noise_scale = -1.0 is not within 0 to 100"),
         (lambda: ReceiverParams(cn0_zenith_dbhz=(50.0, math.nan)), "receiver: cn0_zenith_dbhz = .* is not within"),
         (lambda: ReceiverParams(spacing_chips=0.1), "receiver: spacing_chips = 0.1 is not two numbers"),

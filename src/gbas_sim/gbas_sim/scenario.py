@@ -1,7 +1,8 @@
 """A simulated world from the keys of a configuration file: the site's own, and those under ``sim``.
 
-The reference receivers' antennas and the final approach are the site's (``ground.receivers``, ``ground.approaches``):
-the world puts its receivers where the station says that they are. Everything under ``sim`` may be left out::
+The reference receivers' antennas, the final approach and the troposphere are the site's (``ground.receivers``,
+``ground.approaches``, ``ground.atmosphere``): the world is as the station says, unless it is told to differ. Everything
+under ``sim`` may be left out::
 
     sim:
       systems: "GE"
@@ -11,11 +12,14 @@ the world puts its receivers where the station says that they are. Everything un
       seed: 1
       approach: "rwy26"             # when the station has several
       flight: {speed_mps: 70.0, intercept_distance_m: 20000.0, level_time_s: 300.0, pushover_time_s: 20.0}
+      troposphere: {refractivity: 379.0, scale_height_m: 7900.0, reference_height_m: 130.0}
       ground_receiver: {elevation_mask_deg: 3.0, cn0_zenith_dbhz: [50.0, 52.0], noise_scale: 1.0}
       airborne_receiver: {elevation_mask_deg: 3.0}
 
-Fields and bounds are those of :class:`~gbas_sim.world.WorldParams`, :class:`~gbas_sim.flight.StraightIn` and
-:class:`~gbas_sim.receivers.ReceiverParams`. Angles are degrees in files only.
+Without a refractivity from either, there is no troposphere. Fields and bounds are those of
+:class:`~gbas_sim.world.WorldParams`, :class:`~gbas_sim.flight.StraightIn`,
+:class:`~gbas_sim.troposphere.Troposphere` and :class:`~gbas_sim.receivers.ReceiverParams`. Angles are degrees in
+files only.
 """
 
 from __future__ import annotations
@@ -32,6 +36,7 @@ from gbas_core.approach import FinalApproach
 from gbas_core.approach_keys import approach_from_mapping
 from gbas_sim.flight import StraightIn
 from gbas_sim.receivers import AIRBORNE_RECEIVER, GROUND_RECEIVER, ReceiverParams
+from gbas_sim.troposphere import Troposphere
 from gbas_sim.world import WorldParams
 
 _WORLD_KEYS: Final[dict[str, type]] = {
@@ -42,6 +47,11 @@ _WORLD_KEYS: Final[dict[str, type]] = {
     "seed": int,
 }
 _RECEIVERS: Final = {"ground_receiver": GROUND_RECEIVER, "airborne_receiver": AIRBORNE_RECEIVER}
+_SITE_TROPOSPHERE: Final = {
+    "refractivity": "atmosphere.refractivity",
+    "scale_height_m": "atmosphere.scale_height_m",
+    "reference_height_m": "station.height_m",
+}
 
 
 class ScenarioError(ValueError):
@@ -102,6 +112,8 @@ def scenario_values(world: WorldParams) -> dict[str, Any]:
     for item in fields(StraightIn):
         if item.name != "approach":
             values[f"sim.flight.{item.name}"] = getattr(world.flight, item.name)
+    for item in fields(Troposphere):
+        values[f"sim.troposphere.{item.name}"] = getattr(world.troposphere, item.name)
     for name, receiver in (("ground_receiver", world.ground), ("airborne_receiver", world.airborne)):
         for item in fields(receiver):
             values[f"sim.{name}.{item.name}"] = getattr(receiver, item.name)
@@ -127,7 +139,7 @@ def _section(flat: Mapping[str, Any], prefix: str) -> dict[str, Any]:
 def _world(ground: dict[str, Any], sim: dict[str, Any]) -> WorldParams:
     if not ground:
         raise ValueError("section 'ground' is missing: there is no site")
-    parts = {name: _section(sim, f"{name}.") for name in ("flight", *_RECEIVERS)}
+    parts = {name: _section(sim, f"{name}.") for name in ("flight", "troposphere", *_RECEIVERS)}
     approach = _approach(ground, sim.get("approach"))
     plain = {key: value for key, value in sim.items() if key.partition(".")[0] not in parts and key != "approach"}
     values = {key: _value(f"sim.{key}", value, _WORLD_KEYS) for key, value in plain.items()}
@@ -137,6 +149,7 @@ def _world(ground: dict[str, Any], sim: dict[str, Any]) -> WorldParams:
     return WorldParams(
         receiver_ecef_m=_sites(ground),
         flight=StraightIn(approach=approach, **flight),
+        troposphere=_troposphere(ground, parts["troposphere"]),
         ground=receivers["ground_receiver"],
         airborne=receivers["airborne_receiver"],
         **values,
@@ -172,6 +185,15 @@ def _approach(ground: Mapping[str, Any], name: Any) -> FinalApproach:
         return approach_from_mapping(_section(approaches, f"{chosen}."))
     except ValueError as error:
         raise ValueError(f"ground.approaches.{chosen}: {error}") from None
+
+
+def _troposphere(ground: Mapping[str, Any], section: Mapping[str, Any]) -> Troposphere:
+    kinds = dict.fromkeys(_SITE_TROPOSPHERE, float)
+    values = {key: _value(f"sim.troposphere.{key}", value, kinds) for key, value in section.items()}
+    for key, site_key in _SITE_TROPOSPHERE.items():
+        if key not in values and site_key in ground:
+            values[key] = _value(f"ground.{site_key}", ground[site_key], {site_key.rpartition(".")[2]: float})
+    return Troposphere(**values)
 
 
 def _receiver(name: str, section: Mapping[str, Any]) -> ReceiverParams:

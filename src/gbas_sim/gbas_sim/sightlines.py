@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Final
 
 import numpy as np
@@ -23,7 +23,7 @@ class Sightlines:
     Attributes
     ----------
     range_m, range_rate_mps
-        Path of the signal through empty space, with the Earth's rotation in flight, and its rate against true time at
+        Path of the signal, with the Earth's rotation in flight and all delays, and its rate against true time at
         reception.
     clock_s, clock_drift
         Satellite clock less system time at transmission, with relativity, without group delay, and its rate against
@@ -38,6 +38,10 @@ class Sightlines:
     def of(self, receivers: slice) -> Sightlines:
         """The sightlines of some of the receivers."""
         return Sightlines(**{item.name: getattr(self, item.name)[receivers] for item in fields(self)})
+
+    def delayed(self, delay_m: FloatArray, rate_mps: FloatArray) -> Sightlines:
+        """The sightlines through something that delays code and carrier alike, ``(R, N_SATS)`` [m], [m/s]."""
+        return replace(self, range_m=self.range_m + delay_m, range_rate_mps=self.range_rate_mps + rate_mps)
 
 
 def sky(ephemeris: Ephemeris, gps_week: int, tow_s: FloatArray) -> SatelliteState:
@@ -57,7 +61,7 @@ def sightlines(
     position_m: FloatArray,
     velocity_mps: FloatArray,
 ) -> Sightlines:
-    """Geometry from broadcast orbits.
+    """Geometry from broadcast orbits, through empty space.
 
     Parameters
     ----------
@@ -114,14 +118,16 @@ def range_rate_mps(
     return np.asarray(opening / (1.0 + along / SPEED_OF_LIGHT_MPS))
 
 
-def elevations_rad(position_m: FloatArray, sat_position_m: FloatArray) -> FloatArray:
-    """Elevations ``(..., N_SATS)`` of satellites ``(..., 3, N_SATS)`` at receivers ``(..., 3)``, both ECEF [rad]."""
-    los, _ = los_and_range(position_m, sat_position_m)
-    latitude, longitude, _ = geodetic_from_ecef(position_m)
+def verticals(position_m: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Unit vectors up ``(..., 3)`` and heights above the ellipsoid ``(...)`` [m] at ECEF positions ``(..., 3)``."""
+    latitude, longitude, height_m = geodetic_from_ecef(position_m)
     cos_latitude = np.cos(latitude)
-    sine = (
-        (cos_latitude * np.cos(longitude))[..., np.newaxis] * los[..., 0, :]
-        + (cos_latitude * np.sin(longitude))[..., np.newaxis] * los[..., 1, :]
-        + np.sin(latitude)[..., np.newaxis] * los[..., 2, :]
-    )
+    up = np.stack([cos_latitude * np.cos(longitude), cos_latitude * np.sin(longitude), np.sin(latitude)], axis=-1)
+    return up, height_m
+
+
+def elevations_rad(position_m: FloatArray, up: FloatArray, sat_position_m: FloatArray) -> FloatArray:
+    """Elevations ``(..., N_SATS)`` of satellites ``(..., 3, N_SATS)`` at receivers ``(..., 3)``, all ECEF [rad]."""
+    los, _ = los_and_range(position_m, sat_position_m)
+    sine = sum(up[..., axis, np.newaxis] * los[..., axis, :] for axis in range(3))
     return np.asarray(np.arcsin(np.clip(sine, -1.0, 1.0)))

@@ -24,7 +24,8 @@ from gbas_core.signals import L2, N_BANDS
 from gbas_sim.constellation import nominal_ephemeris
 from gbas_sim.flight import StraightIn
 from gbas_sim.receivers import AIRBORNE_RECEIVER, GROUND_RECEIVER, ReceiverBank, ReceiverParams
-from gbas_sim.sightlines import elevations_rad, sightlines, sky
+from gbas_sim.sightlines import elevations_rad, sightlines, sky, verticals
+from gbas_sim.troposphere import Troposphere
 
 MAX_RECEIVERS: Final = 4
 # The aircraft's noise does not depend on how many reference receivers there are.
@@ -41,6 +42,7 @@ class WorldParams:
     receiver_ecef_m : tuple of (float, float, float)
         Antennas of 1 to 4 reference receivers, ECEF [m].
     flight : StraightIn
+    troposphere : Troposphere
     ground, airborne : ReceiverParams
     systems : str
         ``"G"``, ``"E"`` or ``"GE"``.
@@ -54,6 +56,7 @@ class WorldParams:
 
     receiver_ecef_m: tuple[tuple[float, float, float], ...]
     flight: StraightIn
+    troposphere: Troposphere = Troposphere()
     ground: ReceiverParams = GROUND_RECEIVER
     airborne: ReceiverParams = AIRBORNE_RECEIVER
     systems: str = "GE"
@@ -144,6 +147,8 @@ class _Instant:
     position_m: FloatArray
     velocity_mps: FloatArray
     seen: SatelliteState
+    delay_m: FloatArray
+    delay_rate_mps: FloatArray
     elevation_rad: FloatArray
     tracked: NDArray[np.bool_]
     tracked_before: NDArray[np.bool_]
@@ -196,7 +201,7 @@ class World:
         now = self._instant(number)
         lines = sightlines(
             self.ephemeris, now.gps_week, now.tow_s, now.clock_s, now.seen, now.position_m, now.velocity_mps
-        )
+        ).delayed(now.delay_m, now.delay_rate_mps)
         observations: list[ObservationEpoch] = []
         for bank in self._banks:
             rows = slice(len(observations), len(observations) + len(bank.numbers))
@@ -225,8 +230,10 @@ class World:
         clock_s = np.concatenate([bank.clock_s(since_s) for bank in self._banks], axis=-1)
         position_m, velocity_mps = self._motion(since_s - clock_s[:, -1])
         seen = sky(self.ephemeris, week, tow_s - back_s)
-        elevation = elevations_rad(position_m, seen.position_m[:, np.newaxis])
+        up, height_m = verticals(position_m)
+        elevation = elevations_rad(position_m, up, seen.position_m[:, np.newaxis])
         tracked = elevation >= self._masks_rad
+        delay_m = self.params.troposphere.delay_m(height_m, elevation)
         return _Instant(
             gps_week=week,
             tow_s=tow_s,
@@ -234,6 +241,8 @@ class World:
             position_m=position_m[0],
             velocity_mps=velocity_mps[0],
             seen=SatelliteState(**{item.name: getattr(seen, item.name)[0] for item in fields(seen)}),
+            delay_m=delay_m[0],
+            delay_rate_mps=(delay_m[0] - delay_m[1]) / back_s[1],
             elevation_rad=elevation[0],
             tracked=tracked[0],
             tracked_before=tracked[1],
