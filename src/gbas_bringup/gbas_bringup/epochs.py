@@ -127,3 +127,18 @@ def string_of(data: bytes) -> str:
         return data[_ORIGIN + 4 : _ORIGIN + 4 + max(length - 1, 0)].decode("utf-8")
     except (struct.error, UnicodeDecodeError) as error:
         raise PayloadError(str(error)) from None
+
+
+def payload(msgtype: str, data: bytes) -> bytes:
+    """The bytes of a message without the padding that some transports put behind them."""
+    try:
+        if msgtype == BURST_TYPE:
+            at = dimensions(data)[1]
+            (count,) = struct.unpack_from("<I", data, at)
+            return data[: at + 4 + count]
+        if msgtype == STRING_TYPE:
+            (length,) = struct.unpack_from("<I", data, _ORIGIN)
+            return data[: _ORIGIN + 4 + length]
+    except (struct.error, PayloadError):
+        pass
+    return data

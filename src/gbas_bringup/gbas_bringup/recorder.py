@@ -12,7 +12,7 @@ import platform
 import re
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -285,7 +285,7 @@ class Recorder(GbasNode):
             self.end(EXIT_FAILED)
         return super().due(now_s)
 
-    def details(self) -> Mapping[str, Any]:
+    def details(self) -> dict[str, Any]:
         """Values for the diagnostics."""
         lost = sum(self._recording.lost.values())
         return {"messages": self._recording.written, "lost": lost, "bag": self.params.out}
