@@ -6,11 +6,11 @@ import math
 from dataclasses import replace
 
 import numpy as np
-import protection_loops
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import protection_loops
 from gbas_airborne.protection import Multipliers, h1_levels, k_ffmd, k_md, protection_levels
 from gbas_core.satellites import N_SATS, missing
 from gbas_core.wls import projection_matrix, vertical_lateral
@@ -181,7 +181,7 @@ def test_a_larger_b_value_of_one_sign_never_lowers_the_worst_case(seed: int, fac
 
 
 def within(count: int, trials: int, probability: float) -> bool:
-    """Whether a count of rare events fits its probability, to four standard deviations of the binomial (1 in 16,000)."""
+    """Whether a count of rare events fits its probability, to four standard deviations of the binomial."""
     return abs(count - trials * probability) <= 4.0 * math.sqrt(trials * probability * (1.0 - probability))
 
 
@@ -201,7 +201,7 @@ def test_fault_free_errors_exceed_the_level_as_often_as_said() -> None:
 
 @pytest.mark.parametrize("m", [2, 3, 4])
 def test_a_faulted_receiver_is_covered_as_often_as_said(m: int) -> None:
-    """H1: receiver 0 has a large bias on two satellites. The level of its hypothesis fails with Q(K_md), not more often.
+    """H1: receiver 0 has a large bias on two satellites. Its level fails with probability Q(K_md).
 
     Corrections are the mean of M receivers of sigma sqrt(M) sigma_gnd each, B values as the ground makes them. The
     probability of a missed detection is raised to 5 % so that 20,000 trials see it.

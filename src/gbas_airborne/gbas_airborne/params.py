@@ -97,7 +97,7 @@ class AirborneParams:
     range_test_sigma, range_test_floor_m : float
         A residual beyond this many sigmas and beyond this floor [m] excludes the satellite.
     range_test_max_exclusions : int
-        Satellites the range test may exclude in one epoch; more means no position.
+        Satellites the range test may have excluded at one time; more means no position.
     range_test_hold_s : float
         A satellite the range test excluded is not tried again for this long [s].
     max_condition : float

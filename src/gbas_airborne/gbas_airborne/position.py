@@ -140,21 +140,29 @@ class _Sky:
 
 
 def tested_position(inputs: PositionInputs, start_ecef_m: FloatArray, speed: Speed, params: AirborneParams) -> Attempt:
-    """Position of one epoch without the satellites that fail the range test; arguments as :func:`solve`."""
+    """Position of one epoch without the satellites that fail the range test; arguments as :func:`solve`.
+
+    When more fail, or are held out from earlier epochs, than the parameter allows, there is no position: so many faults
+    at once are not single faults, and the satellites left may be the wrong ones.
+    """
     errors = missing()
-    for exclusions in range(params.range_test_max_exclusions + 1):
+    excluded = int(np.count_nonzero(inputs.sources.reason == int(Rejection.RANGE_TEST)))
+    while True:
         attempt = solve(inputs, start_ecef_m, speed, params)
         worst = worst_range(attempt.fix, params) if attempt.fix is not None else None
         if worst is None:
-            return replace(attempt, range_error_m=errors)
+            break
         index, errors[index] = worst
-        if exclusions < params.range_test_max_exclusions:
-            reason = inputs.sources.reason.copy()
-            reason[index] = int(Rejection.RANGE_TEST)
-            inputs = replace(inputs, sources=replace(inputs.sources, reason=reason))
-    reason = attempt.reason.copy()
-    reason[index] = int(Rejection.RANGE_TEST)
-    return replace(attempt, fix=None, reason=reason, range_error_m=errors)
+        excluded += 1
+        reason = attempt.reason.copy()
+        reason[index] = int(Rejection.RANGE_TEST)
+        if excluded > params.range_test_max_exclusions:
+            attempt = replace(attempt, reason=reason)
+            break
+        source_reason = np.where(reason == int(Rejection.RANGE_TEST), reason, inputs.sources.reason)
+        inputs = replace(inputs, sources=replace(inputs.sources, reason=source_reason))
+    fix = attempt.fix if excluded <= params.range_test_max_exclusions else None
+    return replace(attempt, fix=fix, range_error_m=errors)
 
 
 def solve(inputs: PositionInputs, start_ecef_m: FloatArray, speed: Speed, params: AirborneParams) -> Attempt:

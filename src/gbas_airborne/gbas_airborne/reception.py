@@ -239,7 +239,7 @@ class _Intake:
         if isinstance(block.message, Type2):
             group = block.message.adb4.slots if block.message.adb4 else ()
             expected = tuple(sorted(SLOT_NAMES.index(letter) for letter in self.params.slot_group)) or group
-            if group != expected:
+            if not group or group != expected:
                 self._event(EventKind.STATION, block.station_id, "slot_group", _bits(group), _bits(expected))
                 return False
             return burst.slot in group
