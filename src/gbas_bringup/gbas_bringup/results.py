@@ -89,7 +89,7 @@ class Row:
             lpl_m=protection.lpl_m,
             val_m=protection.val_m,
             lal_m=protection.lal_m,
-            alert=not (protection.alert == 0.0),
+            alert=protection.alert != 0.0,  # a missing flag is an alert
         )
 
     def fields(self) -> tuple[str, ...]:
@@ -116,6 +116,30 @@ def write_solution_csv(path: Path, rows: Iterable[Row]) -> None:
         writer.writerows(row.fields() for row in rows)
 
 
+@dataclass(frozen=True, kw_only=True)
+class PositionErrors:
+    """Absolute errors of the protected positions ``(n,)`` [m]; NaN where there is no position or no truth."""
+
+    horizontal_m: np.ndarray
+    vertical_m: np.ndarray
+    lateral_m: np.ndarray
+
+
+def position_errors(rows: Sequence[Row], truth_m: np.ndarray, *, course_rad: float = 0.0) -> PositionErrors:
+    """Errors of each epoch against the truth ``(3,)`` or ``(len(rows), 3)``; arguments as :func:`error_statistics`."""
+    truth = np.broadcast_to(truth_m, (len(rows), 3))
+    missing = np.full(3, np.nan)
+    position = np.array([missing if row.position_m is None else row.position_m for row in rows]).reshape(-1, 3)
+    known = truth[np.isfinite(truth).all(axis=1)]
+    latitude, longitude, _ = geodetic_from_ecef(known[-1]) if len(known) else (np.nan, np.nan, np.nan)
+    east, north, up = ((position - truth) @ rot_enu_ecef(latitude, longitude).T).T
+    return PositionErrors(
+        horizontal_m=np.hypot(east, north),
+        vertical_m=np.abs(up),
+        lateral_m=np.abs(east * np.cos(course_rad) - north * np.sin(course_rad)),
+    )
+
+
 def error_statistics(rows: Sequence[Row], truth_m: np.ndarray, *, course_rad: float = 0.0) -> dict[str, Any]:
     """Errors of the protected positions against the truth.
 
@@ -132,20 +156,15 @@ def error_statistics(rows: Sequence[Row], truth_m: np.ndarray, *, course_rad: fl
         Root mean square and largest errors [m], and in how many epochs the vertical and the lateral error stayed within
         the protection levels; ``worst_ratio`` is the largest error over its protection level.
     """
-    truth = np.broadcast_to(truth_m, (len(rows), 3))
-    used = [k for k, row in enumerate(rows) if row.position_m is not None and np.isfinite(truth[k]).all()]
-    if not used:
+    errors = position_errors(rows, truth_m, course_rad=course_rad)
+    used = np.flatnonzero(np.isfinite(errors.vertical_m))
+    if not used.size:
         return {"epochs": 0}
-    position = np.array([rows[k].position_m for k in used])
-    latitude, longitude, _ = geodetic_from_ecef(truth[used[0]])
-    error_enu = (position - truth[used]) @ rot_enu_ecef(latitude, longitude).T
-    horizontal = np.hypot(error_enu[:, 0], error_enu[:, 1])
-    vertical = np.abs(error_enu[:, 2])
-    lateral = np.abs(error_enu[:, 0] * np.cos(course_rad) - error_enu[:, 1] * np.sin(course_rad))
+    horizontal, vertical, lateral = errors.horizontal_m[used], errors.vertical_m[used], errors.lateral_m[used]
     vpl = np.array([rows[k].vpl_m for k in used])
     lpl = np.array([rows[k].lpl_m for k in used])
     return {
-        "epochs": len(used),
+        "epochs": int(used.size),
         "horizontal_rms_m": float(np.sqrt(np.mean(horizontal**2))),
         "vertical_rms_m": float(np.sqrt(np.mean(vertical**2))),
         "horizontal_max_m": float(horizontal.max()),

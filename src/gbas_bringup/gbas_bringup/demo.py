@@ -1,0 +1,133 @@
+"""``gbas demo``: one simulated approach through running nodes, and what a person wants to see of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gbas_bringup.bag_records import read_records
+from gbas_bringup.environment import free_domain
+from gbas_bringup.errors import GbasError
+from gbas_bringup.launcher import RunPlan
+from gbas_bringup.report import plot_approach
+from gbas_bringup.resources import config_path
+from gbas_bringup.results import Row, error_statistics, position_errors, summarise, write_json, write_solution_csv
+from gbas_bringup.run_config import read_run_config
+from gbas_bringup.runs import execute
+from gbas_core.gpstime import epoch_key
+from gbas_core.record import Record
+from gbas_ground.params import GroundParams
+from gbas_msgs_py import topics
+from gbas_msgs_py.records import ProtectionEpoch, SolutionEpoch
+from gbas_msgs_py.tables import TruthEpoch
+
+DEMO_CONFIG = "braunschweig.yaml"
+_SOLUTION = topics.resolve(topics.AIRBORNE_SOLUTION)
+_PROTECTION = topics.resolve(topics.AIRBORNE_PROTECTION)
+_TRUTH = topics.resolve(topics.TRUTH_AIRBORNE)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DemoResult:
+    """Files a demo wrote, and its summary."""
+
+    bag: Path
+    csv: Path
+    picture: Path
+    summary_file: Path
+    summary: dict[str, Any]
+
+
+def demo(
+    directory: Path,
+    *,
+    config: Path | None = None,
+    speed: float = 0.0,
+    single_process: bool = False,
+    verbose: bool = False,
+    quiet: bool = False,
+    command: str = "",
+) -> DemoResult:
+    """Fly the approach of a configuration through live nodes, record it, and report from the bag.
+
+    Parameters
+    ----------
+    directory : Path
+        Folder for everything that is written; made if need be.
+    config : Path, optional
+        A configuration with a simulator and one final approach; by default the one of Braunschweig.
+    speed : float
+        Multiple of real time, 0 for as fast as the nodes go.
+
+    Raises
+    ------
+    GbasError
+        When the run fails.
+    """
+    path = config or config_path(DEMO_CONFIG)
+    directory.mkdir(parents=True, exist_ok=True)
+    plan = RunPlan(
+        config=read_run_config(path).with_nodes(),
+        directory=directory,
+        speed=speed,
+        single_process=single_process,
+        domain=free_domain(),
+        isolated=True,
+        command=command,
+    )
+    execute(plan, title="approach", verbose=verbose, quiet=quiet)
+    return report_bag(plan.bag_path, directory, config=path)
+
+
+def report_bag(bag: Path, directory: Path, *, config: Path) -> DemoResult:
+    """Write table, summary and picture of a recorded approach."""
+    records = read_records(bag, (_SOLUTION, _PROTECTION, _TRUTH))
+    protections = {_key(item): item for item in records[_PROTECTION] if isinstance(item, ProtectionEpoch)}
+    pairs = [
+        (item, protections[_key(item)])
+        for item in records[_SOLUTION]
+        if isinstance(item, SolutionEpoch) and _key(item) in protections
+    ]
+    if not pairs:
+        raise GbasError(f"{bag}: holds no airborne solution")
+    rows = [Row.of(solution, protection) for solution, protection in pairs]
+    truth = _truth_m(records[_TRUTH], rows)
+    station = GroundParams.from_yaml(config)
+    approach = station.approaches[0] if station.approaches else None
+    course_rad = approach.course_rad if approach else 0.0
+    result = DemoResult(
+        bag=bag,
+        csv=directory / "solution.csv",
+        picture=directory / "approach.png",
+        summary_file=directory / "summary.json",
+        summary={
+            **summarise(rows),
+            "errors": error_statistics(rows, truth, course_rad=course_rad),
+            "simulated": True,
+        },
+    )
+    write_solution_csv(result.csv, rows)
+    write_json(result.summary_file, result.summary)
+    errors = position_errors(rows, truth, course_rad=course_rad)
+    runway = f" to runway {approach.runway}" if approach else ""
+    plot_approach(
+        [solution for solution, _ in pairs],
+        [protection for _, protection in pairs],
+        result.picture,
+        title=f"Simulated approach{runway}, station {station.station_id}, service type C",
+        errors_m=(errors.vertical_m, errors.lateral_m),
+    )
+    return result
+
+
+def _key(record: Record) -> int:
+    return epoch_key(record.gps_week, record.tow_s)
+
+
+def _truth_m(records: list[Record], rows: list[Row]) -> np.ndarray:
+    known = {_key(item): (item.x_m, item.y_m, item.z_m) for item in records if isinstance(item, TruthEpoch)}
+    missing = (np.nan, np.nan, np.nan)
+    return np.array([known.get(epoch_key(row.gps_week, row.tow_s), missing) for row in rows])
