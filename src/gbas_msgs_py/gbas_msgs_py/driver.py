@@ -159,6 +159,7 @@ class DriverNode(GbasNode, Generic[E]):
         if self.exit_code is not None or self.pacer.outstanding:
             return
         self._say_finished()
+        self.log(f"{self.processed} epochs at {self.achieved_speed(self.now_s()):.1f} times real time")
         self.end()
 
     def _say_finished(self) -> None:

@@ -393,6 +393,10 @@ class GbasNode(Node):
         """End the program after the current callback."""
         self.exit_code = exit_code
 
+    def log(self, text: str) -> None:
+        """Say something once."""
+        self.get_logger().info(text)
+
     def fail(self, reason: str) -> None:
         """End the program because it cannot do its work."""
         self.get_logger().fatal(reason)
@@ -538,6 +542,8 @@ class _Signals:
     def __init__(self) -> None:
         self.stop = threading.Event()
         self.wake: Callable[[], Any] | None = None
+        for number in self._AWAITED:
+            signal.signal(number, signal.SIG_DFL)  # a shell starts background jobs with SIGINT ignored
         signal.pthread_sigmask(signal.SIG_BLOCK, self._AWAITED)
         for number in self._AWAITED:
             signal.signal(number, lambda *_: self._received())

@@ -88,7 +88,7 @@ class ReceiverReplay(DriverNode[RecordedEpoch]):
         if files.user_file:
             self.user = self.table_publisher(topics.AIRBORNE_OBSERVATIONS, tables.OBSERVATIONS, readers=1)
         for note in self.recording.notes():
-            self.get_logger().info(note)
+            self.log(note)
 
     def epochs(self) -> Iterator[RecordedEpoch]:
         first, last = self.recording.overlap

@@ -1,0 +1,207 @@
+"""Real nodes as processes, in a ROS domain of their own; nothing is waited for by sleeping and hoping.
+
+Every wait has a condition and a deadline. The deadlines are generous (a busy machine must not fail a test): they end a
+test that has gone wrong, they are never part of what is measured.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import rclpy
+import yaml
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from std_msgs.msg import Float64MultiArray, String, UInt8MultiArray
+
+from gbas_msgs_py import ros, topics
+from gbas_msgs_py.qos import qos_of
+from gbas_msgs_py.transport import use_profile
+
+DOMAINS = range(60, 100)
+START_S = 60.0
+END_S = 30.0
+
+
+@pytest.fixture
+def domain() -> Iterator[int]:
+    """A domain id nobody else on this machine uses through this fixture, held by a lock on a file."""
+    folder = Path(tempfile.gettempdir()) / "gbas_test_domains"
+    folder.mkdir(exist_ok=True)
+    for number in DOMAINS:
+        with (folder / str(number)).open("w") as file:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                continue
+            yield number
+            return
+    pytest.fail("no free ROS domain")
+
+
+class Process:
+    """A node as a process."""
+
+    def __init__(self, module: str, arguments: list[str], environment: dict[str, str], log: Path) -> None:
+        self.module = module
+        self._log = log
+        with log.open("wb") as out:
+            self._popen = subprocess.Popen(
+                [sys.executable, "-m", module, *arguments],
+                stdin=subprocess.DEVNULL,
+                stdout=out,
+                stderr=subprocess.STDOUT,
+                env=environment,
+                start_new_session=True,
+            )
+
+    @property
+    def output(self) -> str:
+        return self._log.read_text(errors="replace")
+
+    @property
+    def running(self) -> bool:
+        return self._popen.poll() is None
+
+    def wait(self, timeout_s: float = END_S) -> int:
+        """Exit code; the process must end by itself."""
+        try:
+            return self._popen.wait(timeout_s)
+        except subprocess.TimeoutExpired:
+            pytest.fail(f"{self.module} did not end within {timeout_s} s\n{self.output}")
+
+    def send(self, number: int) -> None:
+        self._popen.send_signal(number)
+
+    def interrupt(self, timeout_s: float = END_S) -> int:
+        """Exit code after SIGINT."""
+        if self.running:
+            self.send(signal.SIGINT)
+        return self.wait(timeout_s)
+
+    def kill(self) -> None:
+        if self.running:
+            self._popen.kill()
+        self._popen.wait()
+
+
+class Launcher:
+    """Starts nodes in the test's domain and ends what is left of them."""
+
+    def __init__(self, domain: int, folder: Path) -> None:
+        self._environment = {**os.environ, "ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+        self._folder = folder
+        self.processes: list[Process] = []
+
+    def start(
+        self, module: str, parameters: dict[str, Any] | None = None, *, ros_args: tuple[str, ...] = ()
+    ) -> Process:
+        """Start ``python -m module`` with a parameter file that holds for whatever node it makes."""
+        number = len(self.processes)
+        arguments = ["--ros-args", *ros_args]
+        if parameters is not None:
+            file = self._folder / f"{number}.yaml"
+            file.write_text(yaml.safe_dump({"/**": {"ros__parameters": parameters}}))
+            arguments += ["--params-file", str(file)]
+        process = Process(module, arguments, self._environment, self._folder / f"{number}_{module}.log")
+        self.processes.append(process)
+        return process
+
+    def logs(self) -> str:
+        return "\n".join(f"--- {p.module} (running: {p.running})\n{p.output}" for p in self.processes)
+
+    def end_all(self) -> None:
+        for process in self.processes:
+            process.kill()
+
+
+@pytest.fixture
+def launcher(domain: int, tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Launcher]:
+    launcher = Launcher(domain, tmp_path)
+    yield launcher
+    launcher.end_all()
+    print(launcher.logs())  # pytest shows it when the test has failed
+
+
+class Probe:
+    """A node inside the test: publishes, listens, and waits for conditions."""
+
+    def __init__(self, domain: int) -> None:
+        use_profile(os.environ)
+        self.context = Context()
+        rclpy.init(context=self.context, domain_id=domain)
+        self.node = Node("probe", namespace=topics.DEFAULT_NAMESPACE, context=self.context)
+        self._executor = SingleThreadedExecutor(context=self.context)
+        self._executor.add_node(self.node)
+        self._publishers: dict[str, Any] = {}
+
+    def close(self) -> None:
+        self._executor.shutdown()
+        self.node.destroy_node()
+        rclpy.shutdown(context=self.context)
+
+    def until(self, condition: Callable[[], object], what: str, timeout_s: float = START_S) -> None:
+        """Receive messages until the condition holds."""
+        deadline = time.monotonic() + timeout_s
+        while not condition():
+            if time.monotonic() > deadline:
+                pytest.fail(f"not within {timeout_s} s: {what}")
+            self._executor.spin_once(timeout_sec=0.02)
+
+    def listen(self, topic: str, message_type: type = Float64MultiArray, decode: Any = None) -> list[Any]:
+        """List that fills with what arrives on a topic."""
+        heard: list[Any] = []
+        convert = decode or (ros.table_from_msg if message_type is Float64MultiArray else lambda message: message)
+        profile = ros.qos_profile(qos_of(topic))
+        self.node.create_subscription(message_type, topic, lambda message: heard.append(convert(message)), profile)
+        return heard
+
+    def events(self) -> list[Any]:
+        return self.listen(topics.EVENTS, String, ros.event_from_msg)
+
+    def bursts(self) -> list[Any]:
+        return self.listen(topics.VDB, UInt8MultiArray, ros.burst_from_msg)
+
+    def diagnostics(self) -> dict[str, Any]:
+        """Dictionary that holds the latest status by name: level, message and values."""
+        latest: dict[str, Any] = {}
+
+        def keep(message: DiagnosticArray) -> None:
+            for status in message.status:
+                latest[status.name] = (status.level, status.message, {v.key: v.value for v in status.values})
+
+        self.node.create_subscription(
+            DiagnosticArray, topics.DIAGNOSTICS, keep, ros.qos_profile(qos_of("/diagnostics"))
+        )
+        return latest
+
+    def publisher(self, topic: str, message_type: type = Float64MultiArray, *, readers: int = 1) -> Any:
+        """Publisher that has its readers."""
+        if topic not in self._publishers:
+            profile = ros.qos_profile(qos_of(topic))
+            self._publishers[topic] = self.node.create_publisher(message_type, topic, profile)
+        publisher = self._publishers[topic]
+        self.until(lambda: publisher.get_subscription_count() >= readers, f"{readers} readers of {topic}")
+        return publisher
+
+    def send(self, topic: str, schema: Any, record: Any) -> None:
+        self.publisher(topic).publish(ros.table_to_msg(schema, record))
+
+
+@pytest.fixture
+def probe(domain: int) -> Iterator[Probe]:
+    probe = Probe(domain)
+    yield probe
+    probe.close()

@@ -1,0 +1,124 @@
+"""Recorded receivers through live nodes: nothing lost, and the same bits as offline.
+
+The reference is the offline chain over the same recording; it is validated elsewhere (tests/bringup). Here equality is
+exact: tables are compared by their bytes.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from sensor_msgs.msg import NavSatFix
+from std_msgs.msg import Float64, UInt8
+
+from gbas_airborne.params import AirborneParams
+from gbas_core.recording import RecordedEpoch, Recording
+from gbas_ground.params import GroundParams
+from gbas_msgs_py import tables, topics
+from gbas_msgs_py.events import EventKind
+from gbas_studies.chain import AirborneOutput, Chain, GroundOutput
+
+pytestmark = pytest.mark.ros
+
+SET = "static_pair_L1L2_1h_2010"
+CHAIN = (
+    "gbas_ground.nodes.integrity_monitor",
+    "gbas_ground.nodes.correction_broadcast",
+    "gbas_airborne.nodes.positioning",
+    "gbas_airborne.nodes.protection_level",
+)
+REPLAY = "gbas_ground.nodes.receiver_replay"
+SCALARS = {
+    "vpl_m": topics.AIRBORNE_VPL,
+    "lpl_m": topics.AIRBORNE_LPL,
+    "val_m": topics.AIRBORNE_VAL,
+    "lal_m": topics.AIRBORNE_LAL,
+}
+SECONDS = 60
+"""Of data; the filters below settle in 20 s, so the last 20 s have positions."""
+STATION: dict[str, Any] = {
+    "station": {"id": "TEST", "gcid": 1, "latitude_deg": 41.3889, "longitude_deg": 2.112, "height_m": 166.0},
+    "receivers": {
+        "rr1_ecef_m": [4789013.0077, 176610.1555, 4195034.8091],
+        "rr2_ecef_m": [4789031.3107, 176583.4025, 4195015.1106],
+        "minimum": 1,
+    },
+    "smoothing": {"settle_time_s": 20.0},
+    "monitors": {"require_cn0": False},
+    "vdb": {"slots": "AB"},
+}
+RECEIVER: dict[str, Any] = {"settle_s": 20.0, "max_speed_mps": 1.0}
+PATIENT = {"join_timeout_s": 60.0, "start_wait_s": 60.0}
+"""No deadline may pass because the machine is busy."""
+
+
+@pytest.fixture
+def files(data_dir: Path) -> dict[str, Any]:
+    return {
+        "ground_files": [str(data_dir / SET / "UPC10770.11o.gz"), str(data_dir / SET / "UPC20770.11o.gz")],
+        "user_file": str(data_dir / SET / "UPC20770.11o.gz"),
+        "nav_files": [str(data_dir / SET / "brdc0770.11n.gz")],
+    }
+
+
+def offline(files: dict[str, Any], epochs: slice = slice(0, SECONDS + 1)) -> list[GroundOutput | AirborneOutput]:
+    recording = Recording.open(files["ground_files"], files["user_file"], files["nav_files"])
+    chain = Chain(
+        GroundParams.from_mapping(STATION),
+        AirborneParams.from_mapping(RECEIVER),
+        recording.ephemerides(),
+        recording.user_ephemerides(),
+    )
+    first, last = recording.overlap
+    chosen: list[RecordedEpoch] = list(recording.epochs(first=first, last=last))[epochs]
+    return list(chain.run(chosen))
+
+
+def start_chain(launcher: Any, **more: Any) -> None:
+    parameters = {"ground": STATION, "airborne": RECEIVER, "start_wait_s": 60.0, **more}
+    for module in CHAIN:
+        joins = module.endswith(("integrity_monitor", "positioning"))
+        launcher.start(module, {**parameters, **(PATIENT if joins else {})})
+
+
+def raw(schema: Any, records: list[Any]) -> list[bytes]:
+    return [schema.encode(record).tobytes() for record in records]
+
+
+@pytest.mark.parametrize(("speed", "seconds"), [(0.0, SECONDS), (20.0, 40)])
+def test_live_nodes_give_the_bits_of_the_offline_chain(
+    launcher: Any, probe: Any, files: dict[str, Any], speed: float, seconds: int
+) -> None:
+    integrity, bursts = probe.listen(topics.GROUND_INTEGRITY), probe.bursts()
+    solutions, protections = probe.listen(topics.AIRBORNE_SOLUTION), probe.listen(topics.AIRBORNE_PROTECTION)
+    events, fixes = probe.events(), probe.listen(topics.AIRBORNE_FIX, NavSatFix)
+    scalars = {name: probe.listen(topic, Float64) for name, topic in SCALARS.items()}
+    services = probe.listen(topics.AIRBORNE_SERVICE, UInt8)
+    start_chain(launcher, recorders=1)  # the probe is a recorder of all outputs of the chain
+    replay = launcher.start(REPLAY, {**files, "speed": speed, "stop_s": float(seconds), "start_wait_s": 60.0})
+    expected = offline(files, slice(0, seconds + 1))
+    ground = [each for each in expected if isinstance(each, GroundOutput)]
+    airborne = [each for each in expected if isinstance(each, AirborneOutput)]
+
+    probe.until(lambda: any(event.kind is EventKind.FINISHED for event in events), "the end of the replay", 120.0)
+    assert replay.wait() == 0, replay.output
+    last = (protections, fixes, services, *scalars.values())
+    probe.until(lambda: min(map(len, last)) >= len(airborne), "the last protection level")
+
+    assert raw(tables.INTEGRITY, integrity) == raw(tables.INTEGRITY, [each.integrity for each in ground])
+    assert [b for b in bursts if b.bursts_in_frame] == [b for each in ground for b in each.bursts]
+    assert raw(tables.SOLUTION, solutions) == raw(tables.SOLUTION, [each.solution for each in airborne])
+    assert raw(tables.PROTECTION, protections) == raw(tables.PROTECTION, [each.protection for each in airborne])
+    assert len(fixes) == len(airborne)
+    assert [m.data for m in services] == [each.protection.service for each in airborne]
+    for name, heard in scalars.items():
+        np.testing.assert_array_equal([m.data for m in heard], [getattr(each.protection, name) for each in airborne])
+    # The run is worth comparing only if it gives positions and protection levels.
+    assert sum(each.protection.vpl_m > 0.0 for each in airborne) > seconds - 30
+    expected_events = [event for each in expected for event in each.events]
+    probe.until(lambda: len(events) > len(expected_events), "the last event")
+    told = sorted((e.epoch, e.subject, e.cause) for e in events if e.kind is not EventKind.FINISHED)
+    assert told == sorted((e.epoch, e.subject, e.cause) for e in expected_events)
