@@ -240,6 +240,7 @@ class World:
     troposphere: bool = True
     clock_m: Callable[[float], float] = field(default=lambda t: 1234.5 + 0.3 * t)
     mask_rad: float = math.radians(6.0)
+    _crcs: tuple[Ephemeris, np.ndarray] | None = None
 
     def __post_init__(self) -> None:
         self.station = self.station or self.truth
@@ -276,7 +277,7 @@ class World:
         def refractivity(h: float) -> float:
             return 1e-6 * station.refractivity_index * math.exp(-h / station.scale_height_m)
 
-        above_m = integrate.quad(refractivity, 0.0, height_m)[0]
+        above_m = integrate.quad(refractivity, 0.0, height_m, epsabs=1e-9)[0]
         return -above_m / np.sqrt(0.002 + sine**2)
 
     def ranges_m(self, t: float) -> np.ndarray:
@@ -320,12 +321,18 @@ class World:
         """The correction as sent: what `amend` makes of it, None to leave it out."""
         return self.amend(self.correction(satellite, t), satellite, t)
 
+    def _station_crcs(self) -> np.ndarray:
+        """Ephemeris CRCs of the station's ephemerides, made once for each set."""
+        if self._crcs is None or self._crcs[0] is not self.station:
+            self._crcs = (self.station, ephemeris_crcs(self.station))
+        return self._crcs[1]
+
     def type1(self, t: float, *, z_count_s: float | None = None) -> list[Type1]:
         """Type 1 message or linked pair; the first satellite rotates from frame to frame."""
         turn = round(2.0 * t) % max(len(self.satellites), 1)
         order = self.satellites[turn:] + self.satellites[:turn]
         order = [satellite for satellite in order if self.amended(satellite, t) is not None]
-        crcs = ephemeris_crcs(self.station)
+        crcs = self._station_crcs()
         parts = [order[k : k + MEASUREMENTS_PER_MESSAGE] for k in range(0, len(order), MEASUREMENTS_PER_MESSAGE)]
         parts = parts or [[]]
         flags = [0] if len(parts) == 1 else [1, 3]

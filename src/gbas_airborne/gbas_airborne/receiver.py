@@ -43,6 +43,8 @@ from gbas_msgs_py.vdb.ephemeris_crc import ephemeris_crcs
 _NO_SMOOTHING_S: Final = 1e-9
 # Uncertain, ours: so many epochs refused in a row, each later than the one before, are the time now.
 RESTART_AFTER_REFUSED: Final = 10
+# A pseudorange is some 2e7 m, and a receiver clock is not three seconds off: anything larger is no measurement.
+LARGEST_CODE_M: Final = 1e9
 # Reasons that say nothing about a satellite itself: no event is made of them.
 _SILENT: Final = (Rejection.NO_STATION, Rejection.SYSTEM)
 
@@ -281,6 +283,7 @@ def _track(
     now = (observations.gps_week, observations.tow_s)
     dt_s = seconds_between(*state.observed, *now) if state.observed is not None else math.nan
     code = _finite(observations.code_m)
+    code = np.where(np.abs(code) < LARGEST_CODE_M, code, np.nan)
     carrier = _finite(observations.carrier_m) + state.carrier_offset_m
     step = millisecond_step_m(code[L1] - state.slips.code_m[0, L1], carrier[L1] - state.slips.carrier_m[0, L1])
     carrier = carrier + step

@@ -406,7 +406,8 @@ def correction_set(week: int, tow_s: float, measurements: tuple[Correction100, .
 
 def _station_data(message: Type2) -> StationData:
     adb1 = message.adb1
-    # A multiplier of zero would bound nothing: the station does not provide it.
+    # A multiplier of zero would bound nothing: the station does not provide it. The message has none for Galileo; the
+    # suite's stations mean both constellations by the GPS one.
     k_md_e = adb1.k_md_e_c_gps if adb1 is not None and adb1.k_md_e_c_gps > 0.0 else math.nan
     return StationData(
         reference_ecef_m=ecef_from_geodetic(message.latitude_rad, message.longitude_rad, message.ellipsoid_height_m),
