@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import time
 
 import numpy as np
 import pytest
@@ -438,12 +439,16 @@ def test_longest_flight_is_within_the_validity_of_its_ephemerides():
     assert longest.duration_s + 120.0 < 7200.0  # time of ephemeris within 120 s of the start, GPS valid for 2 h
 
 
-def test_speed(benchmark, world):
-    """A target of 2 ms for four receivers here; not enforced on a busy machine, where only a gross change shows."""
-    numbers = iter(range(10**9))
-    benchmark.pedantic(lambda: world.epoch(next(numbers) % len(world)), rounds=100, warmup_rounds=5)
-    if benchmark.stats is not None:  # None with --benchmark-disable
-        assert benchmark.stats.stats.median < 0.02
+def test_an_epoch_takes_less_than_two_milliseconds():
+    """Processor time of four receivers and an aircraft, the best of several runs: other programs do not count."""
+    world = World(params(receiver_ecef_m=(*SITES, SITES[0])))
+    runs = []
+    for run in range(5):
+        started = time.process_time()
+        for number in range(20 * run, 20 * run + 20):
+            world.epoch(number)
+        runs.append((time.process_time() - started) / 20)
+    assert min(runs) < 2.0e-3
 
 
 def test_site_is_on_the_ground():
