@@ -21,12 +21,41 @@ def config_path(name: str) -> Path:
     return _resource("config", name)
 
 
+def named_config(name: str) -> Path:
+    """A configuration file by its path, or one of ``config/`` by its name with or without ``.yaml``.
+
+    Raises
+    ------
+    ConfigError
+        When there is neither.
+    """
+    path = Path(name)
+    if path.is_file() or len(path.parts) > 1:
+        return path
+    known = {each.stem: each for each in resources("config", "*.yaml")}
+    if path.name.removesuffix(".yaml") in known:
+        return known[path.name.removesuffix(".yaml")]
+    raise ConfigError(name, f"there is no such file, and it is none of {', '.join(sorted(known))}")
+
+
+def resources(folder: str, pattern: str) -> tuple[Path, ...]:
+    """Files of a folder of the package, by name."""
+    for root in _roots():
+        if found := sorted((root / folder).glob(pattern)):
+            return tuple(found)
+    return ()
+
+
 def _resource(folder: str, name: str) -> Path:
-    roots = [Path(__file__).resolve().parents[1], Path(sys.prefix) / "share" / PACKAGE, _ament_share()]
-    for root in roots:
-        if root is not None and (root / folder / name).is_file():
+    for root in _roots():
+        if (root / folder / name).is_file():
             return root / folder / name
     raise ConfigError(name, f"is not in the {folder} folder of {PACKAGE}")
+
+
+def _roots() -> tuple[Path, ...]:
+    places = (Path(__file__).resolve().parents[1], Path(sys.prefix) / "share" / PACKAGE, _ament_share())
+    return tuple(place for place in places if place is not None)
 
 
 def _ament_share() -> Path | None:
