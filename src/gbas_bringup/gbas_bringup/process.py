@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -76,6 +76,8 @@ class ProcessResult:
         What was assumed, left out or repaired.
     ground : GroundParams
     airborne : AirborneParams
+    run_file : dict
+        The same run as a ROS parameter file for ``gbas run``.
     """
 
     rows: tuple[Row, ...]
@@ -84,6 +86,7 @@ class ProcessResult:
     notes: tuple[str, ...]
     ground: GroundParams
     airborne: AirborneParams
+    run_file: dict[str, Any]
 
     def summary(self) -> dict[str, Any]:
         """Body of ``summary.json``."""
@@ -104,6 +107,7 @@ class Prepared:
     ground: GroundParams
     airborne: AirborneParams
     notes: tuple[str, ...]
+    run_file: dict[str, Any]
 
     def epochs(self) -> list[RecordedEpoch]:
         """The epochs in which both the station and the user were observing."""
@@ -132,9 +136,20 @@ def prepare(request: ProcessRequest) -> Prepared:
         request.ground, request.user, request.navigation, user_navigation=request.user_navigation
     )
     notes = list(recording.notes())
-    ground = _ground_params(request, recording, notes)
-    airborne = _airborne_params(request, recording, ground, notes)
-    return Prepared(recording=recording, ground=ground, airborne=airborne, notes=tuple(notes))
+    ground_source, sections = _ground_sections(request, recording, notes)
+    ground = GroundParams.from_mapping(sections, source=ground_source)
+    airborne_values = _airborne_values(request, recording, ground)
+    try:
+        airborne = AirborneParams.from_mapping(airborne_values)
+    except ValueError as error:
+        raise ConfigError(request.airborne or "gbas process", str(error)) from None
+    return Prepared(
+        recording=recording,
+        ground=ground,
+        airborne=airborne,
+        notes=tuple(notes),
+        run_file=_run_file(request, sections, airborne_values),
+    )
 
 
 def process(request: ProcessRequest, *, progress: Progress | None = None) -> ProcessResult:
@@ -154,16 +169,22 @@ def process(request: ProcessRequest, *, progress: Progress | None = None) -> Pro
         notes=prepared.notes,
         ground=prepared.ground,
         airborne=prepared.airborne,
+        run_file=prepared.run_file,
     )
 
 
 def write_results(result: ProcessResult, out: Path) -> dict[str, Any]:
-    """Write ``solution.csv``, ``summary.json`` and ``events.jsonl`` into a folder; returns the summary."""
+    """Write the results into a folder; returns the summary.
+
+    ``solution.csv``, ``summary.json``, ``events.jsonl``, and ``run.yaml``: the same files through live nodes with
+    ``gbas run run.yaml``.
+    """
     out.mkdir(parents=True, exist_ok=True)
     write_solution_csv(out / "solution.csv", result.rows)
     (out / "events.jsonl").write_text("".join(event.to_json() + "\n" for event in result.events), encoding="utf-8")
     summary = result.summary()
     write_json(out / "summary.json", summary)
+    (out / "run.yaml").write_text(yaml.safe_dump(result.run_file, sort_keys=False), encoding="utf-8")
     return summary
 
 
@@ -192,7 +213,27 @@ def _document(path: Path) -> Any:
         raise ConfigError(path, f"is not YAML: {error}") from None
 
 
-def _ground_params(request: ProcessRequest, recording: Recording, notes: list[str]) -> GroundParams:
+def _run_file(request: ProcessRequest, ground: Mapping[str, Any], airborne: Mapping[str, Any]) -> dict[str, Any]:
+    """ROS parameter file of the same run through live nodes."""
+    replay = {
+        "ground_files": [str(path.resolve()) for path in request.ground],
+        "user_file": str(request.user.resolve()),
+        "nav_files": [str(path.resolve()) for path in request.navigation],
+        "systems": request.systems,
+    }
+    if request.user_navigation:
+        replay["user_nav_files"] = [str(path.resolve()) for path in request.user_navigation]
+    sections = {name: values for name, values in ground.items() if values}
+    return {
+        "/**": {"ros__parameters": {"ground": sections, "airborne": dict(airborne)}},
+        "/gbas/receiver_replay": {"ros__parameters": replay},
+    }
+
+
+def _ground_sections(
+    request: ProcessRequest, recording: Recording, notes: list[str]
+) -> tuple[str, dict[str, dict[str, Any]]]:
+    """Sections of the station's configuration, and where they come from."""
     path = request.station or config_path(NOMINAL_STATION)
     if request.station is None:
         notes.append(f"no station file: nominal values of {NOMINAL_STATION} are assumed")
@@ -220,8 +261,8 @@ def _ground_params(request: ProcessRequest, recording: Recording, notes: list[st
         monitors["require_cn0"] = False
         notes.append(f"{', '.join(without)}: no C/N0 in the file, so signal power is not monitored")
     if request.fas is not None:
-        sections["approaches"] = {"fas": _fas(request.fas)}
-    return GroundParams.from_mapping(sections, source=str(path))
+        sections["approaches"] = {"fas": dict(_fas(request.fas))}
+    return str(path), sections
 
 
 def _header_positions(recording: Recording, notes: list[str]) -> tuple[tuple[float, float, float], ...]:
@@ -245,26 +286,17 @@ def _fas(path: Path) -> Mapping[str, Any]:
     return fas
 
 
-def _airborne_params(
-    request: ProcessRequest, recording: Recording, ground: GroundParams, notes: list[str]
-) -> AirborneParams:
+def _airborne_values(request: ProcessRequest, recording: Recording, ground: GroundParams) -> dict[str, Any]:
+    """Values of the receiver's configuration."""
     document = {} if request.airborne is None else _document(request.airborne) or {}
     for key in ("/**", "ros__parameters", "airborne"):
         document = document.get(key, document)
-    given = dict(document)
-    known = {item.name for item in fields(AirborneParams)}
     assert recording.user is not None
-    defaults: dict[str, Any] = {
+    values: dict[str, Any] = {
         "service": request.service,
         "systems": request.systems,
         "max_gap_s": max(3.5, 1.5 * (recording.user.interval_s or 0.0)),
     }
     if ground.approaches:
-        defaults["rpds"] = ground.approaches[0].rpds
-    if unknown := sorted(set(given) - known):
-        raise ConfigError(request.airborne or "airborne", f"is not one of {', '.join(sorted(known))}", unknown[0])
-    try:
-        return AirborneParams.from_mapping({**defaults, **given})
-    except ValueError as error:
-        raise ConfigError(request.airborne or "gbas process", str(error)) from None
-
+        values["rpds"] = ground.approaches[0].rpds
+    return {**values, **document}

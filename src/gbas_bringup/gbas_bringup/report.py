@@ -54,7 +54,7 @@ def plot_approach(
         if errors_m is not None:
             axis.plot(distance_km, errors_m[index], color=_ERROR, linewidth=0.9, label=f"{name} error")
         _shade_alerts(axis, distance_km, np.array([epoch.alert for epoch in protections]) != 0.0)
-        axis.legend(loc="lower right", ncols=4, fontsize="small", framealpha=0.9)
+        axis.legend(loc="upper right", ncols=4, fontsize="small", framealpha=0.9)
     axes[1].set_xlabel("distance to the threshold [km]  (the aircraft flies to the right)")
     if np.isfinite(distance_km).any():
         axes[1].set_xlim(np.nanmax(distance_km), min(0.0, np.nanmin(distance_km)))
@@ -69,7 +69,7 @@ def _panel(axis: Axes, distance_km: np.ndarray, level: np.ndarray, limit: np.nda
     axis.set_ylabel(f"{name} [m]")
     # Errors are centimetres, protection levels metres and limits tens of metres: only a logarithm shows all three.
     axis.set_yscale("log")
-    axis.set_ylim(0.01, 200.0)
+    axis.set_ylim(0.003, 600.0)
     axis.yaxis.set_major_formatter("{x:g}")
     axis.grid(alpha=0.3, which="both", linewidth=0.5)
 
