@@ -179,6 +179,7 @@ def test_unhealthy_station(gcid: int) -> None:
     flight.step(DURATION_S)
     assert_no_guidance(flight, "station_unhealthy")
     assert flight.protections[-1].state == ApproachState.LOSS
+    assert np.isnan(position_of(flight.solutions[-1])).all()
 
 
 def test_station_in_test_mode() -> None:

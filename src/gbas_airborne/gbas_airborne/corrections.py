@@ -38,7 +38,10 @@ _YOUNGEST_S: Final = 0.5
 
 
 class Rejection(IntEnum):
-    """Why a satellite is not used; in the order the rules are applied, the first that holds is the reason."""
+    """Why a satellite is not used; in the order the rules are applied, the first that holds is the reason.
+
+    NO_STATION stands for all that is wrong with the station itself: none heard, no corrections, or unhealthy.
+    """
 
     NONE = 0
     NOT_TRACKED = 1
@@ -177,7 +180,7 @@ def ranging_sources(
         What the station said about ephemerides.
     """
     tracked = np.isfinite(ranges.smoothed_m)
-    if station is None or corrections is None:
+    if station is None or not station.healthy or corrections is None:
         reason = np.where(tracked, int(Rejection.NO_STATION), int(Rejection.NOT_TRACKED))
         return RangingSources(
             reason=reason,

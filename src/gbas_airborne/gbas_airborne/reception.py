@@ -33,6 +33,8 @@ SOURCE: Final = "positioning"
 RPI_LETTERS: Final = "AXZJCVPT"
 # Known (facts 1.5): 14 is GBAS only, 15 is any provider.
 GBAS_PROVIDERS: Final = (14, 15)
+# Known (facts 1.5, 3.5): 1 to 4 are healthy, 7 is unhealthy; 0, 5 and 6 mean nothing and give no service.
+HEALTHY_GCID: Final = (1, 2, 3, 4)
 L1_CA_MEASUREMENT: Final = 0
 GUIDANCE_TYPES: Final = (1, 2, 4, 11)
 _KEY_TOLERANCE_MS: Final = 1
@@ -54,6 +56,11 @@ class StationData:
     k_md_e: float
     rsds: int | None
     slots: tuple[int, ...] | None
+
+    @property
+    def healthy(self) -> bool:
+        """Whether the station's continuity/integrity designator allows any service."""
+        return self.gcid in HEALTHY_GCID
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

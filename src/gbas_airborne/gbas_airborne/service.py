@@ -19,11 +19,11 @@ from typing import Final, NamedTuple
 from gbas_airborne.guidance import alert_limits_m
 from gbas_airborne.params import NO_FAS, AirborneParams
 from gbas_airborne.protection import NOT_PROTECTED, Multipliers, ProtectionLevels, protection_levels
+from gbas_airborne.reception import HEALTHY_GCID
 from gbas_core.approach import APD_C, APD_CD
 from gbas_msgs_py.events import Event, EventKind
 from gbas_msgs_py.records import ProtectionEpoch, ServiceType, SolutionEpoch
 
-HEALTHY_GCID: Final = (1.0, 2.0, 3.0, 4.0)
 SERVICE_C_APD: Final = (float(APD_C), float(APD_CD))
 SOURCE: Final = "protection_level"
 
