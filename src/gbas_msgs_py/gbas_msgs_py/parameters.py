@@ -10,9 +10,11 @@ import dataclasses
 import difflib
 import typing
 from collections.abc import Iterable, Mapping
-from typing import Any, TypeVar
+from typing import Any, Final, TypeVar
 
 P = TypeVar("P")
+
+_KINDS: Final = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
 
 
 class ParameterError(ValueError):
@@ -60,7 +62,7 @@ def _coerced(name: str, value: Any, kind: Any) -> Any:
         return float(value)
     if typing.get_origin(kind) is tuple:
         return _coerced_tuple(name, value, typing.get_args(kind)[0])
-    require(name, value, type(value) is kind, f"a {kind.__name__}")
+    require(name, value, type(value) is kind, _KINDS[kind])
     return value
 
 
@@ -69,5 +71,5 @@ def _coerced_tuple(name: str, value: Any, kind: Any) -> tuple[Any, ...]:
     if value is None or (kind is str and value in ([""], [b""], ("",))):
         return ()
     iterable = hasattr(value, "__iter__") and not isinstance(value, str | bytes)
-    require(name, value, iterable, f"a list of {kind.__name__}")
+    require(name, value, iterable, "a list")
     return tuple(_coerced(name, each, kind) for each in value)
