@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Make a virtual environment with the suite and everything it needs: scripts/setup.sh [directory] (default .venv).
-# Works on a bare Debian or Ubuntu machine with Python 3.11 or 3.12; GBAS_PYTHON names an interpreter to use instead.
+# Works on a bare Debian or Ubuntu machine with Python 3.11, 3.12 or 3.13; GBAS_PYTHON names an interpreter to use instead.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 venv=${1:-.venv}
@@ -18,17 +18,18 @@ apt_install() {
 }
 
 # Each candidate is run, not only looked up: version managers put stand-ins on the path that do not start.
-usable() { "$1" -c 'import sys; sys.exit(sys.version_info[:2] not in ((3, 11), (3, 12)))' </dev/null >/dev/null 2>&1; }
+usable() { "$1" -c 'import sys; sys.exit(sys.version_info[:2] not in ((3, 11), (3, 12), (3, 13)))' </dev/null >/dev/null 2>&1; }
 
 find_python() {
     local candidate
     if [ -n "${GBAS_PYTHON:-}" ]; then
-        usable "$GBAS_PYTHON" || die "GBAS_PYTHON=$GBAS_PYTHON is not a Python 3.11 or 3.12"
+        usable "$GBAS_PYTHON" || die "GBAS_PYTHON=$GBAS_PYTHON is not a Python 3.11, 3.12 or 3.13"
         echo "$GBAS_PYTHON"
         return
     fi
-    for candidate in python3.12 python3.11 python3 /usr/bin/python3.12 /usr/bin/python3.11 /usr/bin/python3 \
-        "${HOME:-}"/.pyenv/versions/3.1[12].*/bin/python; do
+    for candidate in python3.12 python3.11 python3.13 python3 \
+        /usr/bin/python3.12 /usr/bin/python3.11 /usr/bin/python3.13 /usr/bin/python3 \
+        "${HOME:-}"/.pyenv/versions/3.1[123].*/bin/python; do
         if usable "$candidate"; then
             echo "$candidate"
             return
@@ -41,7 +42,7 @@ make_venv() {
     local python version
     python=$(find_python) || {
         apt_install python3
-        python=$(find_python) || die "no Python 3.11 or 3.12 found; install one, or name it in GBAS_PYTHON"
+        python=$(find_python) || die "no Python 3.11, 3.12 or 3.13 found; install one, or name it in GBAS_PYTHON"
     }
     version=$("$python" -c 'import sys; print("%d.%d" % sys.version_info[:2])' </dev/null)
     say "Python $version ($python)"
@@ -54,7 +55,8 @@ make_venv() {
 install() {
     local index=${PIP_INDEX_URL:-$("$venv/bin/python" -m pip config get global.index-url 2>/dev/null || true)}
     [ -z "$index" ] || export UV_INDEX_URL="$index"
-    if [ -x "$venv/bin/uv" ] && "$venv/bin/uv" pip install -q --system-certs --python "$venv/bin/python" "$@" 2>"$venv/uv.log"; then
+    if [ -x "$venv/bin/uv" ] &&
+        "$venv/bin/uv" pip install -q --system-certs --python "$venv/bin/python" "$@" 2>"$venv/uv.log"; then
         return
     fi
     "$venv/bin/python" -m pip install -q --disable-pip-version-check --no-compile "$@"
