@@ -52,7 +52,7 @@ def test_an_empty_list_has_several_spellings_in_ros(empty: Any) -> None:
         ({"count": True}, "parameter 'count' is True"),
         ({"flag": 1}, "parameter 'flag' is 1, expected true or false"),
         ({"name": 5}, "parameter 'name' is 5, expected a text"),
-        ({"files": "a"}, "parameter 'files' is 'a', expected a list of texts"),
+        ({"files": "a"}, "parameter 'files' is 'a', expected a list"),
         ({"files": [1]}, "parameter 'files' is 1, expected a text"),
         ({"numbers": ["a"]}, "parameter 'numbers' is 'a', expected a number"),
     ],
