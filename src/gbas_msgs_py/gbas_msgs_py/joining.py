@@ -104,6 +104,9 @@ class EpochJoiner(Generic[T]):
         """Whether every source has delivered something."""
         return None not in self._watermark.values()
 
+    def __len__(self) -> int:
+        return len(self._pending)
+
     def dropped(self, source: str) -> int:
         """Items of a source that were late or repeated."""
         return self.late[source] + self.duplicate[source]
@@ -255,6 +258,9 @@ class AirborneJoiner(Generic[T]):
     def heard_all(self) -> bool:
         """Whether any burst has been delivered."""
         return self._bursts.passed is not None
+
+    def __len__(self) -> int:
+        return len(self._pending)
 
     @property
     def dropped(self) -> int:

@@ -96,6 +96,9 @@ class Positioning(GbasNode):
         self.publish_events(events)
         self.finished_epoch(week, tow_s)
 
+    def details(self) -> dict[str, Any]:
+        return {"epochs_waiting": len(self.joiner)}
+
     def finish(self) -> None:
         self.steps(self.joiner.flush())
 

@@ -84,6 +84,9 @@ class IntegrityMonitor(GbasNode):
         self.publish_events(events)
         self.finished_epoch(week, tow_s)
 
+    def details(self) -> dict[str, Any]:
+        return {"epochs_waiting": len(self.joiner), "receivers": len(self.receivers)}
+
     def finish(self) -> None:
         self.steps(self.joiner.flush())
 
