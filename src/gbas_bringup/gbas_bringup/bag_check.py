@@ -5,6 +5,7 @@ A problem names file, topic and index. A note is something a person should know 
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import math
 from collections import Counter, defaultdict
@@ -216,8 +217,17 @@ class _Contents:
             self._contract(file, topic, index, message, decoded)
         except (SchemaError, EventError, epochs.PayloadError) as error:
             wrong(str(error))
+            self._keep_place(topic, message)
             return
         self._result.checked["payloads decoded"] += 1
+
+    def _keep_place(self, topic: str, message: Message) -> None:
+        """A message that cannot be used is not missing as well."""
+        with contextlib.suppress(epochs.PayloadError):
+            key = epochs.epoch_of(message.channel.schema.name, message.data)
+            keys = self._series[topic].keys
+            if key is not None and message.channel.schema.name == epochs.TABLE_TYPE and (not keys or keys[-1] < key):
+                keys.append(key)
 
     def _sequence(self, file: str, topic: str, message: Message, wrong: Callable[[str], None]) -> None:
         series = self._series.setdefault(topic, _Series(file))

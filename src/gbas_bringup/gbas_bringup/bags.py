@@ -394,7 +394,8 @@ class _SequenceGaps:
 
 def _copy(writer: BagWriter, message: Message, losses: _SequenceGaps) -> None:
     name = message.channel.topic
-    writer.log.add_topic(topic_of(message.channel))
+    if name not in writer.log:
+        writer.log.add_topic(topic_of(message.channel))
     writer.log.write(name, message.data, message.log_time_ns, message.publish_time_ns, message.sequence)
     losses.add(name, message.sequence)
 

@@ -448,7 +448,9 @@ def _print_table(title: str, headings: tuple[str, ...], rows: list[tuple[str, ..
     from rich.console import Console
     from rich.table import Table
 
-    table = Table(*headings, title=title or None, title_justify="left", box=None, pad_edge=False)
+    if title:
+        print(f"{title}:")
+    table = Table(*headings, box=None, pad_edge=False)
     for row in rows:
         table.add_row(*row)
     Console(width=None if sys.stdout.isatty() else _WIDE).print(table)

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import socket
 import sys
+import tempfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Final
+from typing import IO, Final
 
 from gbas_bringup.errors import GbasError
 from gbas_msgs_py.transport import use_profile
 
 MAX_DOMAIN: Final = 232
-_FREE_DOMAINS: Final = range(20, 102)
-"""Domains whose ports lie below those the system gives to programs at random (32768 and up)."""
+_FREE_DOMAINS: Final = range(20, 60)
+"""Domains that are given out; their ports lie below those the system gives to programs at random (32768 and up)."""
+_held: list[IO[str]] = []
 _DISCOVERY_PORT: Final = 7400
 _PORTS_A_DOMAIN: Final = 250
 
@@ -64,14 +67,31 @@ def ament_prefix_path(environment: Mapping[str, str]) -> str:
 
 
 def free_domain() -> int:
-    """A ROS domain in which nothing runs on this machine, so that a run neither disturbs nor is disturbed."""
-    count = len(_FREE_DOMAINS)
-    start = os.getpid() % count
-    for step in range(count):
-        domain = _FREE_DOMAINS[(start + step) % count]
+    """A ROS domain in which nothing runs on this machine, so that a run neither disturbs nor is disturbed.
+
+    A lock that this process holds to its end keeps others of the suite from taking it as well.
+
+    Raises
+    ------
+    GbasError
+        When all are taken.
+    """
+    folder = Path(tempfile.gettempdir()) / f"gbas-domains-{os.getuid()}"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    start = os.getpid() % len(_FREE_DOMAINS)
+    for domain in (*_FREE_DOMAINS[start:], *_FREE_DOMAINS[:start]):
+        file = (folder / str(domain)).open("w")
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            file.close()
+            continue
         if not _in_use(domain):
+            _held.append(file)
             return domain
-    return _FREE_DOMAINS[start]
+        file.close()
+    last = _FREE_DOMAINS[-1]
+    raise GbasError(f"every ROS domain from {_FREE_DOMAINS[0]} to {last} is in use on this machine; give one: --domain")
 
 
 def _in_use(domain: int) -> bool:

@@ -117,6 +117,9 @@ class McapLog:
         """The topics in order of registration."""
         return tuple(topic for _, topic in self._channels.values())
 
+    def __contains__(self, topic: str) -> bool:
+        return topic in self._channels
+
     def add_topic(self, topic: Topic) -> None:
         """Register a topic; needed before its first message."""
         with self._lock:
