@@ -105,9 +105,7 @@ class Launcher:
         self._folder = folder
         self.processes: list[Process] = []
 
-    def start(
-        self, module: str, parameters: dict[str, Any] | None = None, *, ros_args: tuple[str, ...] = ()
-    ) -> Process:
+    def start(self, module: str, parameters: dict[str, Any] | None = None, ros_args: tuple[str, ...] = ()) -> Process:
         """Start ``python -m module`` with a parameter file that holds for whatever node it makes."""
         number = len(self.processes)
         arguments = ["--ros-args", *ros_args]
