@@ -28,7 +28,19 @@ _ROUNDING_SLACK: Final = 1e-6
 # Nothing on the VDB is larger than this; beyond it arithmetic could overflow before the bounds are looked at.
 _LARGEST: Final = 1e15
 
+# Fields up to this long are decoded by a table.
+_TABULATED_BITS: Final = 8
+_REFUSED: Final = object()
+
 Rounding = Literal["nearest", "up", "down"]
+
+
+def _rounded_up(counts: float) -> int:
+    return math.ceil(counts - _ROUNDING_SLACK)
+
+
+def _rounded_down(counts: float) -> int:
+    return math.floor(counts + _ROUNDING_SLACK)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,9 +135,9 @@ class Number:
         elif self.rounding == "nearest":
             raw = round(counts)
         elif self.rounding == "up":
-            raw = math.ceil(counts - _ROUNDING_SLACK)
+            raw = _rounded_up(counts)
         else:
-            raw = math.floor(counts + _ROUNDING_SLACK)
+            raw = _rounded_down(counts)
         low, high = self.bounds
         if low <= raw <= high and raw not in self.codes:
             return raw
@@ -170,6 +182,46 @@ class Number:
     def missing(self) -> float | None:
         """What stands for a missing value: None for integers, NaN for quantities."""
         return None if self.scale is None else math.nan
+
+    @cached_property
+    def quick_raw(self) -> Callable[[Any], int | None]:
+        """:meth:`to_raw` for ordinary values; gives None for all others, which are to_raw's business."""
+        (low, high), offset, codes = self.bounds, self.offset, self.codes
+        numerator, denominator = self._ratio
+        rounded = {"nearest": round, "up": _rounded_up, "down": _rounded_down}[self.rounding]
+
+        def integer(value: Any) -> int | None:
+            if type(value) is not int:
+                return None
+            raw = value - offset
+            return raw if low <= raw <= high and raw not in codes else None
+
+        def quantity(value: Any) -> int | None:
+            if type(value) is not float or not -_LARGEST < value < _LARGEST:
+                return None
+            raw = rounded((value - offset) * denominator / numerator)
+            return raw if low <= raw <= high and raw not in codes else None
+
+        return integer if self.scale is None else quantity
+
+    @cached_property
+    def quick_value(self) -> Callable[[int], Any]:
+        """:meth:`from_raw`; of short fields all values are made once."""
+        if self.bits > _TABULATED_BITS:
+            return self.from_raw
+        values = [self._value_or_refused(raw) for raw in range(1 << self.bits)]
+
+        def tabulated(raw: int) -> Any:
+            value = values[raw]
+            return self.from_raw(raw) if value is _REFUSED else value
+
+        return tabulated
+
+    def _value_or_refused(self, raw: int) -> Any:
+        try:
+            return self.from_raw(raw)
+        except FieldError:
+            return _REFUSED
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -325,6 +377,69 @@ class Layout:
         """Entries decoded after the others."""
         return tuple(entry for entry in self.entries if isinstance(entry, Switch))
 
+    @cached_property
+    def fixed(self) -> FixedPlaces | None:
+        """The quick codec, where every field is a number at a fixed place; None elsewhere."""
+        simple = all(isinstance(entry, Number | Spare | Vector) for entry in self.entries)
+        return FixedPlaces(self) if simple else None
+
+
+class FixedPlaces:
+    """Codec of a layout of numbers whose places do not depend on the record: bits move as one integer.
+
+    Corrections are by far the most of what is sent, and all of this kind: this costs a third of going entry by entry.
+
+    Attributes
+    ----------
+    n_bits : int
+        Of the whole layout.
+    """
+
+    def __init__(self, layout: Layout) -> None:
+        self._record = layout.record
+        self._conditional = tuple((number.name, str(number.valid_if), number.missing) for number in layout.conditional)
+        self._numbers: list[tuple[Number, int, int]] = []
+        self._vectors: list[tuple[Vector, tuple[int, ...], int]] = []
+        at = 0
+        for entry in layout.entries:
+            if isinstance(entry, Vector):
+                places = tuple(at + index * entry.item.bits for index in range(entry.length))
+                self._vectors.append((entry, places, (1 << entry.item.bits) - 1))
+                at += entry.length * entry.item.bits
+            else:
+                assert isinstance(entry, Number | Spare)
+                if isinstance(entry, Number):
+                    self._numbers.append((entry, at, (1 << entry.bits) - 1))
+                at += entry.bits
+        self.n_bits = at
+
+    def encode(self, record: Any) -> int:
+        """The record's bits; raises FieldError as :func:`encode` does."""
+        bits = 0
+        for entry, place, mask in self._numbers:
+            raw = entry.quick_raw(getattr(record, entry.name))
+            if raw is None:
+                raw = _number_to_raw(entry, record)
+            bits |= (raw & mask) << place
+        for vector, places, mask in self._vectors:
+            values, item = getattr(record, vector.name), vector.item
+            _check_length(vector, values)
+            for value, place in zip(values, places, strict=True):
+                raw = item.quick_raw(value)
+                bits |= ((item.to_raw(value) if raw is None else raw) & mask) << place
+        return bits
+
+    def decode(self, bits: int) -> Any:
+        """The record of its bits; raises FieldError as :func:`decode` does."""
+        values = {entry.name: entry.quick_value(bits >> place & mask) for entry, place, mask in self._numbers}
+        for vector, places, mask in self._vectors:
+            value_of = vector.item.quick_value
+            values[vector.name] = tuple([value_of(bits >> place & mask) for place in places])
+        for name, valid_if, missing in self._conditional:
+            if is_missing(values[valid_if]):
+                values[name] = missing
+        return self._record(**values)
+
 
 def is_missing(value: Any) -> bool:
     """Whether a value says nothing: None, NaN or an empty group."""
@@ -369,9 +484,13 @@ def _number_to_raw(entry: Number, record: Any) -> int:
     return entry.to_raw(value)
 
 
-def _encode_vector(entry: Vector, values: Any, writer: BitWriter) -> None:
+def _check_length(entry: Vector, values: Any) -> None:
     if len(values) != entry.length:
         raise FieldError(f"{entry.name} has {len(values)} values, not {entry.length}")
+
+
+def _encode_vector(entry: Vector, values: Any, writer: BitWriter) -> None:
+    _check_length(entry, values)
     for value in values:
         writer.put(entry.item.to_raw(value), entry.item.bits)
 
@@ -379,12 +498,19 @@ def _encode_vector(entry: Vector, values: Any, writer: BitWriter) -> None:
 def _encode_group(entry: Group, items: Any, writer: BitWriter) -> None:
     # Each item is collected apart: shifting a short integer is cheaper than shifting the whole message.
     for position, item in enumerate(items):
-        part = BitWriter()
         try:
-            encode(entry.layout, item, part)
+            bits, n_bits = _item_bits(entry.layout, item)
         except FieldError as error:
             raise FieldError(f"{entry.name}[{position}]: {error}") from None
-        writer.put(part.value, part.n_bits)
+        writer.put(bits, n_bits)
+
+
+def _item_bits(layout: Layout, item: Any) -> tuple[int, int]:
+    if layout.fixed is not None:
+        return layout.fixed.encode(item), layout.fixed.n_bits
+    part = BitWriter()
+    encode(layout, item, part)
+    return part.value, part.n_bits
 
 
 def decode(layout: Layout, reader: BitReader) -> Any:
@@ -404,6 +530,8 @@ def decode(layout: Layout, reader: BitReader) -> Any:
 
 
 def _decode(layout: Layout, reader: BitReader) -> Any:
+    if layout.fixed is not None:
+        return layout.fixed.decode(reader.take(layout.fixed.n_bits))
     values: dict[str, Any] = {}
     counts: dict[str, int] = {}
     raw_of_switch: dict[int, int] = {}
