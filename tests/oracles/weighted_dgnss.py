@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pyrtklib as rtk
+
 from rtklib_dgnss import plain_copy, select_galileo_message
 
 C_MPS = 299_792_458.0
