@@ -3,7 +3,9 @@
 SHELL := /bin/bash
 VENV := .venv
 READY := $(VENV)/.ready
-RUN := env -u PYTHONPATH -u PYTHONHOME AMENT_PREFIX_PATH=$(CURDIR)/$(VENV) PATH="$(CURDIR)/$(VENV)/bin:$$PATH"
+PATHS := PATH="$(CURDIR)/$(VENV)/bin:$$PATH"
+RUN := env -u PYTHONPATH -u PYTHONHOME $(PATHS) AMENT_PREFIX_PATH=$(CURDIR)/$(VENV)
+COLCON := env -u PYTHONPATH -u PYTHONHOME -u AMENT_PREFIX_PATH $(PATHS) COLCON_DEFAULTS_FILE=colcon_defaults.yaml colcon
 ARGS ?=
 
 ifndef GBAS_DATA
@@ -38,10 +40,10 @@ lint: $(READY)  ## ruff, and mypy --strict on the pure modules
 	@$(RUN) mypy
 
 build: $(READY)  ## colcon build of the ROS 2 workspace
-	@cd ros2_ws && $(RUN) COLCON_DEFAULTS_FILE=colcon_defaults.yaml colcon build
+	@cd ros2_ws && $(COLCON) build
 
 packages: $(READY)  ## list the packages as colcon sees them
-	@cd ros2_ws && $(RUN) COLCON_DEFAULTS_FILE=colcon_defaults.yaml colcon list
+	@cd ros2_ws && $(COLCON) list
 
 clean:  ## remove .venv and all that was built
 	rm -rf $(VENV) ros2_ws/build ros2_ws/install ros2_ws/log src/*/build src/*/*.egg-info
