@@ -4,7 +4,7 @@ SHELL := /bin/bash
 VENV := .venv
 READY := $(VENV)/.ready
 PATHS := PATH="$(CURDIR)/$(VENV)/bin:$$PATH"
-RUN := env -u PYTHONPATH -u PYTHONHOME $(PATHS) AMENT_PREFIX_PATH=$(CURDIR)/$(VENV)
+RUN := env -u PYTHONPATH -u PYTHONHOME $(PATHS) AMENT_PREFIX_PATH="$(CURDIR)/$(VENV)"
 COLCON := env -u PYTHONPATH -u PYTHONHOME -u AMENT_PREFIX_PATH $(PATHS) COLCON_DEFAULTS_FILE=colcon_defaults.yaml colcon
 ARGS ?=
 
@@ -18,7 +18,7 @@ endif
 .DEFAULT_GOAL := help
 
 help:  ## what can be made
-	@sed -n 's/^\([a-z]*\):.*## /  make \1|/p' $(MAKEFILE_LIST) | column -t -s '|'
+	@awk -F':.*## ' '/^[a-z]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 $(READY): constraints.txt scripts/setup.sh $(wildcard src/*/setup.py)
 	@scripts/setup.sh $(VENV)
