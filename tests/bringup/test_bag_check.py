@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import random
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -220,3 +221,18 @@ def test_unclosed_bag_is_found(fake_bag: Any, tmp_path: Path) -> None:
     texts = [str(problem) for problem in check(tmp_path / "flight").problems]
     assert any("never closed" in text for text in texts)
     assert any("metadata.yaml is missing" in text for text in texts)
+
+
+def test_random_damage_is_always_a_finding(fake_bag: Any, tmp_path: Path) -> None:
+    """Every byte is under some CRC, or part of what readers need; and no damage ends in a crash."""
+    fake_bag(epochs=12, served_from=3, lost_at=9).write(tmp_path / "flight", chunk_bytes=5_000)
+    file = tmp_path / "flight" / "flight_0.mcap"
+    original = file.read_bytes()
+    numbers = random.Random(3)
+    for _ in range(150):
+        data = bytearray(original)
+        at = numbers.randrange(8, len(data) - 8)
+        data[at] ^= 1 << numbers.randrange(8)
+        file.write_bytes(data)
+        result = check(tmp_path / "flight")
+        assert not result.ok, f"a bit of byte {at} of {len(data)}"

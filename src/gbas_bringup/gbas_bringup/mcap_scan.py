@@ -174,6 +174,8 @@ class McapScan:
                 self.closed = view[size - len(MAGIC) :] == MAGIC and size - body - length >= tail
                 if not self.closed:
                     self.damages.append(Damage(at, "the summary at the end is cut off", {}))
+                elif not _summary_is_whole(view, body + length):
+                    self.damages.append(Damage(body + length, "the CRC of the summary is wrong", {}))
                 return
             try:
                 yield from self._record(opcode, record)
@@ -277,6 +279,13 @@ def _chunk_records(record: bytes) -> bytes:
     if len(data) != size or (crc and zlib.crc32(data) != crc):
         raise _Unreadable("the CRC of a chunk is wrong")
     return bytes(data)
+
+
+def _summary_is_whole(view: mmap.mmap, start: int) -> bool:
+    """Whether the CRC in the footer is that of the summary and the footer; 0 means that there is none."""
+    end = len(view) - len(MAGIC) - 4
+    (crc,) = struct.unpack_from("<I", view, end)
+    return crc in (0, zlib.crc32(view[start:end]))
 
 
 def _whole_chunks(view: mmap.mmap, start: int) -> Iterator[int]:
