@@ -94,11 +94,14 @@ class Capture:
             self._thread.join()
         now = time.monotonic()
         last_s, end_s = now, now + limit_s
-        while self.failure is None and time.monotonic() < min(last_s + quiet_s, end_s):
-            if self._take_all():
-                last_s = time.monotonic()
-            else:
-                time.sleep(_GATHER_S)
+        try:
+            while self.failure is None and time.monotonic() < min(last_s + quiet_s, end_s):
+                if self._take_all():
+                    last_s = time.monotonic()
+                else:
+                    time.sleep(_GATHER_S)
+        except Exception as error:
+            self.failure = error
 
     def _run(self) -> None:
         try:

@@ -183,6 +183,7 @@ class Recorder(GbasNode):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(NODE_NAME, RecorderParams, **kwargs)
+        self.check_overrides()  # before there is a bag
         params: RecorderParams = self.params
         metadata = suite_metadata(params.command or " ".join(sys.argv), params.config_files)
         writer = BagWriter(
@@ -302,10 +303,17 @@ class Recorder(GbasNode):
         try:
             counts = self._recording.writer.close({END_METADATA: end})
         except OSError as error:
-            print(f"{NODE_NAME}: {self.params.out}: {error}", file=sys.stderr, flush=True)
+            if self.exit_code is None:
+                print(f"{NODE_NAME}: {self.params.out}: {error}", file=sys.stderr, flush=True)
             self.end(EXIT_FAILED)
             return
         self.get_logger().info(f"{sum(counts.values())} messages of {len(counts)} topics in {self.params.out}")
+
+    def close(self, *, orderly: bool) -> None:
+        """End the thread before what it uses goes."""
+        if not orderly:
+            self._capture.stop(0.0, 0.0)
+        super().close(orderly=orderly)
         self._inputs.destroy_node()
 
 
