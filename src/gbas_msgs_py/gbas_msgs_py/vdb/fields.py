@@ -188,7 +188,8 @@ class Number:
         """:meth:`to_raw` for ordinary values; gives None for all others, which are to_raw's business."""
         (low, high), offset, codes = self.bounds, self.offset, self.codes
         numerator, denominator = self._ratio
-        rounded = {"nearest": round, "up": _rounded_up, "down": _rounded_down}[self.rounding]
+        roundings: dict[str, Callable[[float], int]] = {"nearest": round, "up": _rounded_up, "down": _rounded_down}
+        rounded = roundings[self.rounding]
 
         def integer(value: Any) -> int | None:
             if type(value) is not int:
