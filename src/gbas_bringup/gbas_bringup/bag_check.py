@@ -22,8 +22,8 @@ from rosbags.typesys.store import Typestore
 
 from gbas_bringup import epochs
 from gbas_bringup.bags import METADATA_FILE, bag_files
-from gbas_bringup.data_time import is_ephemeris, is_observation
 from gbas_bringup.mcap_scan import McapScan, Message
+from gbas_bringup.topic_names import contract_name, is_ephemeris, is_observation, is_progress, split
 from gbas_core.gpstime import calendar_text, epoch_key, from_epoch_key
 from gbas_msgs_py import topics
 from gbas_msgs_py.events import Event, EventError, EventKind
@@ -250,7 +250,7 @@ class _Contents:
 
     def _contract(self, file: str, topic: str, index: int, message: Message, decoded: Any) -> None:
         """What the topic carries must follow the contract."""
-        spec = self._specs.get(topic) or self._specs.get(_in_usual_namespace(topic))
+        spec = self._specs.get(topic) or self._specs.get(topics.resolve(contract_name(topic)))
         kind = message.channel.schema.name
         if spec is not None and spec.message_type != kind:
             raise SchemaError(f"has type {kind}, expected {spec.message_type}")
@@ -290,7 +290,7 @@ class _Contents:
     def check_order(self) -> None:
         """Epochs must grow, receivers must have them all, and every input must have its output."""
         for topic, series in self._series.items():
-            if is_ephemeris(topic) or f"/{topics.PROGRESS_PREFIX}" in topic:
+            if is_ephemeris(topic) or is_progress(topic):
                 continue  # a reception, and how far a reader is, may be said twice
             for index, (before, after) in enumerate(itertools.pairwise(series.keys), start=1):
                 if after <= before:
@@ -305,7 +305,7 @@ class _Contents:
 
     def _outputs(self, observed: list[int]) -> None:
         for topic, series in self._series.items():
-            namespace, _, name = _split(topic)
+            namespace, name = split(topic)
             if name == topics.GROUND_INTEGRITY:
                 self._complete(topic, series, observed, "was observed")
             elif name in (topics.AIRBORNE_SOLUTION, topics.AIRBORNE_PROTECTION):
@@ -383,19 +383,6 @@ class _Contents:
 
 def _is_ground_observation(topic: str) -> bool:
     return is_observation(topic) and "/ground/" in topic
-
-
-def _in_usual_namespace(topic: str) -> str:
-    """The topic as it would be called in the usual namespace."""
-    return topics.resolve(_split(topic)[2])
-
-
-def _split(topic: str) -> tuple[str, str, str]:
-    """Namespace, slash, and the name by which the contract knows a topic."""
-    for spec in topics.TOPICS:
-        if not spec.name.startswith("/") and topic.endswith(f"/{spec.name}"):
-            return topic[: -len(spec.name) - 1], "/", spec.name
-    return topic.rpartition("/")
 
 
 def _epoch(key: int) -> str:

@@ -21,6 +21,7 @@ from gbas_bringup import epochs
 from gbas_bringup.errors import BagError
 from gbas_bringup.mcap_log import METADATA_FILE, BagWriter, Topic
 from gbas_bringup.mcap_scan import Channel, Damage, McapScan, Message
+from gbas_bringup.topic_names import is_observation
 from gbas_core.gpstime import from_epoch_key
 
 SUITE_METADATA: Final = "gbas"
@@ -28,7 +29,6 @@ CONFIGURATION_METADATA: Final = "gbas.configuration"
 END_METADATA: Final = "gbas.end"
 RECOVERY_METADATA: Final = "gbas.recovery"
 _NOT_COPIED: Final = frozenset({"rosbag2", END_METADATA})
-_OBSERVATIONS: Final = re.compile(r".*/observations$")
 
 
 def bag_files(path: Path) -> tuple[Path, ...]:
@@ -279,7 +279,7 @@ def info(path: Path) -> BagInfo:
         summary = topics.setdefault(name, _TopicSummary(message.channel.schema.name))
         summary.add(message)
         first_ns, last_ns = min(first_ns, message.log_time_ns), max(last_ns, message.log_time_ns)
-        if _OBSERVATIONS.match(name) and summary.msgtype == epochs.TABLE_TYPE:
+        if is_observation(name) and summary.msgtype == epochs.TABLE_TYPE:
             try:
                 observed.add(epochs.table_epoch(message.data))
                 origins.add(simulated_column(message.data))

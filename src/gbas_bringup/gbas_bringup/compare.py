@@ -12,6 +12,7 @@ from typing import Any, Final
 from gbas_bringup import epochs
 from gbas_bringup.bags import BagReader
 from gbas_bringup.mcap_scan import Message
+from gbas_bringup.topic_names import contract_name
 from gbas_core.gpstime import from_epoch_key
 from gbas_msgs_py import topics
 
@@ -29,10 +30,7 @@ Key = tuple[str, int, int, int]
 
 def output_name(topic: str) -> str | None:
     """What a compared output is called; None for a topic that is not compared."""
-    for name, text in NAMES.items():
-        if topic == name or topic.endswith(f"/{name}"):
-            return text
-    return None
+    return NAMES.get(contract_name(topic))
 
 
 @dataclass

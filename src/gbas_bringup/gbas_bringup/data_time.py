@@ -7,13 +7,12 @@ publish time.
 from __future__ import annotations
 
 import json
-import re
 from typing import Final
 
 from gbas_bringup import epochs
+from gbas_bringup.topic_names import is_ephemeris, is_observation, split
 from gbas_msgs_py import topics
 
-_OBSERVATIONS: Final = re.compile(r".*/observations$")
 _BESIDE_PROTECTION: Final = (
     topics.AIRBORNE_VPL,
     topics.AIRBORNE_LPL,
@@ -21,16 +20,6 @@ _BESIDE_PROTECTION: Final = (
     topics.AIRBORNE_LAL,
     topics.AIRBORNE_SERVICE,
 )
-
-
-def is_observation(topic: str) -> bool:
-    """Whether a topic carries the observations of a receiver."""
-    return _OBSERVATIONS.match(topic) is not None
-
-
-def is_ephemeris(topic: str) -> bool:
-    """Whether a topic carries broadcast ephemerides."""
-    return topic == topics.EPHEMERIS or topic.endswith(f"/{topics.AIRBORNE_EPHEMERIS}")
 
 
 class DataTime:
@@ -69,8 +58,9 @@ class DataTime:
 
     def _borrowed(self, topic: str) -> int | None:
         if topic not in self._partner:
-            name = next((name for name in _BESIDE_PROTECTION if topic.endswith(f"/{name}")), None)
-            self._partner[topic] = topic[: -len(name)] + topics.AIRBORNE_PROTECTION if name else None
+            namespace, name = split(topic)
+            beside = name in _BESIDE_PROTECTION
+            self._partner[topic] = f"{namespace}/{topics.AIRBORNE_PROTECTION}" if beside else None
         partner = self._partner[topic]
         if partner is None:
             return self.current

@@ -8,7 +8,6 @@ recorded and waits for nobody. The bytes of a message are not touched.
 from __future__ import annotations
 
 import heapq
-import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -21,9 +20,9 @@ from rclpy.publisher import Publisher
 from gbas_bringup import epochs
 from gbas_bringup.bags import BagReader
 from gbas_bringup.capture import message_class
-from gbas_bringup.data_time import is_ephemeris, is_observation
 from gbas_bringup.errors import BagError
 from gbas_bringup.mcap_scan import Message
+from gbas_bringup.topic_names import contract_name, is_ephemeris, is_observation, is_progress, is_truth
 from gbas_msgs_py import topics
 from gbas_msgs_py.driver import DriverNode, DriverParams
 from gbas_msgs_py.node import require, run
@@ -32,15 +31,15 @@ from gbas_msgs_py.ros import qos_profile
 
 NODE_NAME: Final = "player"
 ACK_TIMEOUT_S: Final = 10.0
-_TRUTH: Final = re.compile(r".*/truth/[^/]+$")
 _LOOK_AHEAD: Final = 32
 """Epochs read ahead: messages of one epoch lie at most a driver's window apart in a bag."""
-_NOT_PLAYED: Final = re.compile(rf"^{topics.CLOCK}$|/{topics.PROGRESS_PREFIX}|^/rosout$|^/parameter_events$")
+_NOT_PLAYED: Final = frozenset({topics.CLOCK, "/rosout", "/parameter_events"})
+"""The player has a clock of its own; the others are ROS' own business."""
 
 
 def is_input(topic: str) -> bool:
     """Whether a topic carries what a driver sends, and no node computes."""
-    return is_observation(topic) or is_ephemeris(topic) or _TRUTH.match(topic) is not None
+    return is_observation(topic) or is_ephemeris(topic) or is_truth(topic)
 
 
 @dataclass(order=True)
@@ -103,15 +102,19 @@ class PlayerParams(DriverParams):
         Folder or ``.mcap`` file.
     mode : str
         ``"inputs"`` or ``"all"``.
+    discovery_s : float
+        In mode ``all`` nobody is waited for by name: the time in which readers that are there are found [s].
     """
 
     bag: str = ""
     mode: str = "inputs"
+    discovery_s: float = 1.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
         require("bag", self.bag, bool(self.bag), "a bag")
         require("mode", self.mode, self.mode in ("inputs", "all"), "'inputs' or 'all'")
+        require("discovery_s", self.discovery_s, 0.0 <= self.discovery_s <= 60.0, "0 to 60 s")
 
 
 class Player(DriverNode[PlayedEpoch]):
@@ -120,6 +123,7 @@ class Player(DriverNode[PlayedEpoch]):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(NODE_NAME, PlayerParams, **kwargs)
         self._path = Path(self.params.bag)
+        self._made_s = self.now_s()
         self._inputs_only = self.params.mode == "inputs"
         self._outputs = {
             name: self._output(name, msgtype) for name, msgtype in self.recorded.items() if self._played(name)
@@ -136,16 +140,26 @@ class Player(DriverNode[PlayedEpoch]):
         return found
 
     def _played(self, topic: str) -> bool:
-        return is_input(topic) if self._inputs_only else _NOT_PLAYED.search(topic) is None
+        if self._inputs_only:
+            return is_input(topic)
+        return topic not in _NOT_PLAYED and not is_progress(topic)
 
     def _output(self, name: str, msgtype: str) -> Publisher:
         try:
             kind = message_class(msgtype)
         except LookupError as error:
             raise BagError(self._path, f"{name}: {error}") from error
-        if not self._inputs_only:
-            return self.create_publisher(kind, name, qos_profile(qos_of(name)))
-        return self._gated_publisher(kind, name, 1 if is_observation(name) or is_ephemeris(name) else 0)
+        needed = self._inputs_only and (is_observation(name) or is_ephemeris(name))
+        publisher = self.create_publisher(kind, name, qos_profile(qos_of(contract_name(name))))
+        self._gated.append((publisher, int(needed) + self.params.recorders))
+        return publisher
+
+    def due(self, now_s: float) -> float:
+        """Send what may be sent."""
+        wait_s = self._made_s + self.params.discovery_s - now_s
+        if wait_s > 0.0 and not self._inputs_only:
+            return wait_s
+        return super().due(now_s)
 
     def flies(self) -> bool:
         """Whether the bag has observations of an aircraft."""

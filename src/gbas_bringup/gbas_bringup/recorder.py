@@ -23,10 +23,11 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from gbas_bringup import __version__, epochs
 from gbas_bringup.bags import CONFIGURATION_METADATA, END_METADATA, SUITE_METADATA
 from gbas_bringup.capture import Capture, Taken
-from gbas_bringup.data_time import DataTime, is_observation
+from gbas_bringup.data_time import DataTime
 from gbas_bringup.definitions import definition, qos_record
 from gbas_bringup.errors import ConfigError
 from gbas_bringup.mcap_log import CHUNK_BYTES, FLUSH_PERIOD_S, BagWriter, Topic
+from gbas_bringup.topic_names import contract_name, is_observation
 from gbas_core.gpstime import from_epoch_key
 from gbas_msgs_py import topics
 from gbas_msgs_py.node import EXIT_FAILED, GbasNode, NodeParams, require, run
@@ -256,7 +257,7 @@ class Recorder(GbasNode):
         types = dict(self._inputs.get_topic_names_and_types()).get(name) or [_type_of(name)]
         profiles = [
             qos_record(
-                depth=info.qos_profile.depth or qos_of(_relative(name)).depth,  # discovery does not tell the depth
+                depth=info.qos_profile.depth or qos_of(contract_name(name)).depth,  # discovery does not tell the depth
                 reliable=info.qos_profile.reliability == ReliabilityPolicy.RELIABLE,
                 transient_local=_latched(info.qos_profile),
             )
@@ -328,12 +329,6 @@ def _type_of(name: str) -> str:
         if topics.resolve(spec.name) == name:
             return spec.message_type
     raise LookupError(name)
-
-
-def _relative(name: str) -> str:
-    """Name by which the contract knows a topic of any namespace."""
-    known = (spec.name for spec in topics.TOPICS if not spec.name.startswith("/"))
-    return next((each for each in known if name.endswith(f"/{each}")), name)
 
 
 def _latched(profile: QoSProfile) -> bool:

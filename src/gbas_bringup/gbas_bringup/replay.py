@@ -8,13 +8,13 @@ from typing import Any
 
 from gbas_bringup import bags
 from gbas_bringup.compare import TopicComparison, compare
-from gbas_bringup.data_time import is_observation
 from gbas_bringup.environment import free_domain
 from gbas_bringup.errors import BagError
 from gbas_bringup.launcher import RunPlan
 from gbas_bringup.node_kinds import NODE_KINDS, NodeInstance
 from gbas_bringup.run_config import RunConfig, read_run_config
 from gbas_bringup.runs import execute
+from gbas_bringup.topic_names import is_observation
 
 CONFIGURATION_FOLDER = "configuration"
 
