@@ -331,6 +331,18 @@ def test_a_jump_of_one_code_restarts_that_satellite():
     assert cause[20, 0, L1, G09] == SlipCause.CODE
 
 
+@pytest.mark.parametrize("field", ["code", "carrier"])
+@pytest.mark.parametrize("doppler", [True, False])
+def test_a_measurement_that_repeats_is_never_one(field, doppler):
+    """A receiver that goes on sending its last values: without Doppler nothing else tells after the first epoch."""
+    data = made(20, 0.5, doppler=doppler)
+    values = getattr(data, field)
+    values[10:, 0, L1, G09] = values[9, 0, L1, G09]
+    causes, _, _ = run(data, AIRCRAFT)
+    assert (causes[10:, 0, L1, G09] & SlipCause.FROZEN > 0).all()
+    assert not (causes[:, 0, L1] & SlipCause.FROZEN)[:, np.arange(N_SATS) != G09].any()
+
+
 def test_the_rate_test_waits_for_enough_satellites():
     """Of two satellites nobody can say whose carrier moved; the net of the code is left."""
     data = single_band(made(40, 1.0, doppler=False))

@@ -9,6 +9,8 @@ filter starts anyway). The tests:
 - **Doppler**: carrier change against the integrated Doppler (trapezoid).
 - **rate**: carrier change against its own extrapolation, and against the geometric range where the caller knows it.
 - **geometry-free**: change of the difference of two carriers, L1-L5 and L1-L2.
+- **frozen**: a carrier equal to the last one to the last bit, or such a code while the carrier moved on, was not
+  measured anew.
 
 The Doppler and rate tests first remove what all satellites of a receiver have in common: its clock and, for a moving
 receiver whose lines of sight the caller knows, its motion. Receivers step their clock, mostly by whole milliseconds. A
@@ -48,6 +50,8 @@ _MILLISECOND_M: Final = SPEED_OF_LIGHT_MPS * 1e-3
 _FIT_UNKNOWNS: Final = 4
 _FIT_MAX_CONDITION: Final = 100.0
 _FIT_MIN_REDUNDANCY: Final = 0.05
+# Codes smoothed by the receiver repeat by chance while the range stands still, but not beyond their noise.
+_FROZEN_CODE_M: Final = 1.0
 _WHOLE_MILLISECONDS_M: Final = 15.0  # a code step this close to whole milliseconds is one
 
 
@@ -60,6 +64,7 @@ class SlipCause(IntFlag):
     DOPPLER = 8
     RATE = 16
     GEOMETRY_FREE = 32
+    FROZEN = 64
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -242,7 +247,7 @@ def slip_step(
             followed_m, carrier_m = followed_m + step_m, carrier_m + step_m[:, np.newaxis, np.newaxis]
             epoch = epoch._replace(carrier_m=carrier_m - state.carrier_m)
         found, rate_mps = _tests(epoch, state, los, dt_s, params)
-        cause |= found
+        cause |= found | _frozen(state, code_m, carrier_m)
         rate_mps = np.where(cause == 0, rate_mps, np.nan)
     else:
         cause |= _flag(np.isfinite(carrier_m - state.carrier_m), SlipCause.GAP)
@@ -264,6 +269,12 @@ def _lock_lost(lli: FloatArray) -> CauseArray:
     """Bit 0 of the indicator as a cause."""
     bits = np.where(np.isfinite(lli), lli, 0.0).astype(np.int64)
     return _flag(bits & 1 == 1, SlipCause.LOCK)
+
+
+def _frozen(state: SlipState, code_m: FloatArray, carrier_m: FloatArray) -> CauseArray:
+    """Repeated measurements; a static receiver may meet one by chance for an instant, when a range turns round."""
+    moved = np.abs(carrier_m - state.carrier_m) > _FROZEN_CODE_M
+    return _flag((carrier_m == state.carrier_m) | ((code_m == state.code_m) & moved), SlipCause.FROZEN)
 
 
 def _flag(found: BoolArray, cause: SlipCause) -> CauseArray:
