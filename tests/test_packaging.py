@@ -81,7 +81,8 @@ def test_every_import_is_declared(package: Path) -> None:
     imported = set().union(*(top_level_imports(path) for path in modules(package)))
     imported -= set(sys.stdlib_module_names) | {package.name, "__future__"}
     python = {DISTRIBUTION.get(name, name) for name in imported - ROS}
-    assert python <= set(arguments["install_requires"])
+    optional = set().union(*arguments.get("extras_require", {}).values())
+    assert python <= set(arguments["install_requires"]) | optional
     manifest = ElementTree.parse(package / "package.xml").getroot()
     declared = {item.text for item in manifest.findall("exec_depend")}
     assert imported & (ROS | set(NAMES)) <= declared

@@ -37,6 +37,7 @@ setup(
         "typer",
         "PyYAML",
     ],
+    extras_require={"bench": ["pyrtklib"]},  # gbas bench compares with it
     zip_safe=True,
     entry_points={
         "console_scripts": [
