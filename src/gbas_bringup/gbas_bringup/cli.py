@@ -285,18 +285,39 @@ def process(
 
 @app.command()
 def bench(
-    quick: Annotated[bool, typer.Option("--quick", help="Short form: less exact.")] = False,
+    part: Annotated[
+        list[str] | None,
+        typer.Option(help="Only this: steps, offline, process, latency, replay or files; may be repeated."),
+    ] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Short runs: less exact.")] = False,
+    seconds: Annotated[float | None, typer.Option(help="Duration of the latency run (default: 40).")] = None,
+    data: Annotated[Path | None, typer.Option(help="Folder of recorded data (default: GBAS_DATA).")] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for what is written (default: out/bench-N).")] = None,
     as_json: Json = False,
 ) -> None:
-    """Measure latency, replay speed through live nodes, and offline speed on this machine."""
-    from gbas_bringup import bench as body
+    """Measure the speed of the suite on this machine, each figure against a bound or a peer.
 
-    result = body.bench(_new_out(out, "bench"), quick=quick, quiet=as_json)
+    Steps of one epoch, the whole chain offline, `gbas process` beside RTKLIB, latency and replay speed of live nodes,
+    each its own process. The ratio says how many times better a figure is than what it is compared with.
+    """
+    from gbas_bringup import bench as body
+    from gbas_bringup.progress import progress
+
+    folder = _new_out(out, "bench")
+    with progress("measuring", enabled=not as_json) as update:
+        result = body.run_bench(
+            folder,
+            parts=part or body.PARTS,
+            quick=quick,
+            seconds=seconds,
+            data=data,
+            progress=lambda name: update(0, None, name),
+        )
     if as_json:
         print_json(result)
-    else:
-        _print_summary(result)
+        return
+    body.print_report(result)
+    _print_places({"report": folder / "bench.json"})
 
 
 # --- bags

@@ -43,6 +43,9 @@ def _rounded_down(counts: float) -> int:
     return math.floor(counts + _ROUNDING_SLACK)
 
 
+_ROUNDED: Final[dict[Rounding, Callable[[float], int]]] = {"nearest": round, "up": _rounded_up, "down": _rounded_down}
+
+
 @dataclass(frozen=True, kw_only=True)
 class Number:
     """A quantity: value = offset + scale * raw.
@@ -132,12 +135,8 @@ class Number:
             raw = int(value) - self.offset
             if raw != counts:
                 raise FieldError(f"{self.name} = {value!r} is not an integer")
-        elif self.rounding == "nearest":
-            raw = round(counts)
-        elif self.rounding == "up":
-            raw = _rounded_up(counts)
         else:
-            raw = _rounded_down(counts)
+            raw = _ROUNDED[self.rounding](counts)
         low, high = self.bounds
         if low <= raw <= high and raw not in self.codes:
             return raw

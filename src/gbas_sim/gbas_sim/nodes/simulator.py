@@ -32,8 +32,10 @@ class SimulatorParams(DriverParams):
 class Simulator(DriverNode[SimulatedEpoch]):
     """Sends a :class:`gbas_sim.world.World`, epoch by epoch, and where the aircraft really is."""
 
+    params_type = SimulatorParams
+
     def __init__(self, **kwargs: Any) -> None:
-        super().__init__("simulator", SimulatorParams, **kwargs)
+        super().__init__("simulator", self.params_type, **kwargs)
         config = self.params.config
         given = {key: value for key, value in self.overrides().items() if key.startswith(("ground.", "sim."))}
         sections = {**(read_sections(config) if config else {}), **given}
