@@ -112,8 +112,10 @@ class DriverNode(GbasNode, Generic[E]):
         return self._pump()
 
     def _on_progress(self, reader: str, progress: ProgressEpoch) -> None:
-        self._progress_s = self.now_s()
+        before = self.pacer.outstanding
         self.pacer.on_progress(reader, epoch_key(progress.gps_week, progress.tow_s))
+        if self.pacer.outstanding < before:  # readers repeat what they said last, which is no progress
+            self._progress_s = self.now_s()
         if self._started_s is not None:
             self._pump()
 
