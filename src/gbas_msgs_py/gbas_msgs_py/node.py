@@ -60,6 +60,7 @@ REPORT_PERIOD_S: Final = 1.0
 _POLL_S: Final = 0.1
 _GATE_POLL_S: Final = 0.01
 _GRACE_S: Final = 0.005
+_LAST_ACK_S: Final = 2.0
 SECTIONS: Final = ("ground", "airborne", "sim", "qos_overrides")
 """First words of dotted parameters that belong to a part of the suite; one file may hold them for all nodes."""
 
@@ -136,7 +137,7 @@ class GbasNode(Node):
         self._backlog: deque[Callable[[], None]] = deque()
         self._backlog_since_s: float | None = None
         self._open = False
-        self._events = self._publisher(String, topics.EVENTS)
+        self._events = self._gated_publisher(String, topics.EVENTS, 0)
         self._diagnostics = self._publisher(DiagnosticArray, topics.DIAGNOSTICS)
         self._progress = self._publisher(Float64MultiArray, topics.progress(self.get_name()))
 
@@ -408,8 +409,9 @@ class GbasNode(Node):
             self._open_gate()
             self.finish()
             self._report(time.monotonic(), final=True)
+            deadline_s = time.monotonic() + _LAST_ACK_S  # for all together: a reader that was killed never answers
             for publisher in [*self.publishers]:
-                publisher.wait_for_all_acked(Duration(seconds=1))
+                publisher.wait_for_all_acked(Duration(seconds=max(0.0, deadline_s - time.monotonic())))
         self.destroy_node()
 
     # --- diagnostics
