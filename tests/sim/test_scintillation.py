@@ -262,7 +262,7 @@ def test_fading_is_continuous():
     """Deviates turn by a right angle in a correlation time: 1.6 % in 10 ms of 1 s, of numbers of up to 5."""
     world = Scintillation(params=ScintillationParams(**FLAT), seed=4)
     start = START_MS - START_MS % 60_000
-    deviates = np.array([world.epoch(at(start + 10 * k), (0,)).deviate for k in range(300)])
+    deviates = np.array([world.epoch(at(start + 10 * k), (0, 1)).deviate for k in range(300)])
     assert np.abs(np.diff(deviates, axis=0)).max() < 0.5 * math.pi * 0.01 * 5.0 * math.sqrt(2.0)
 
 
