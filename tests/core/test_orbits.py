@@ -21,7 +21,7 @@ from gbas_core.frames import EARTH_RATE_RADPS, GM_GPS_M3PS2, azimuth_elevation, 
 from gbas_core.gpstime import seconds_between
 from gbas_core.rinex import NavigationFile, read_navigation, read_observations
 from gbas_core.satellites import IS_GALILEO, IS_GPS, N_SATS, SAT_IDS, SAT_INDEX, missing
-from gbas_core.signals import IONO_RATIO, L1, L2, L5, SPEED_OF_LIGHT_MPS
+from gbas_core.signals import IONO_RATIO, L1, L2, L5, N_BANDS, SPEED_OF_LIGHT_MPS
 
 NAVIGATION_FILES = (
     "static_pair_L1L2_1h_2010/brdc0770.10n.gz",
@@ -160,6 +160,15 @@ def _about_z(angle: float) -> np.ndarray:
 def _about_x(angle: float) -> np.ndarray:
     c, s = math.cos(angle), math.sin(angle)
     return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+
+
+def test_place_is_that_of_the_state_to_the_bit(mosaic: Ephemeris) -> None:
+    pseudorange_m = np.linspace(2.0e7, 2.8e7, 4 * N_SATS).reshape(4, N_SATS)
+    for band in (*range(N_BANDS), None):
+        state = orbits.transmit_state(mosaic, 2320, 116400.0, pseudorange_m, band)
+        place = orbits.transmit_place(mosaic, 2320, 116400.0, pseudorange_m, band)
+        np.testing.assert_array_equal(place.position_m, state.position_m)
+        np.testing.assert_array_equal(place.clock_s, state.clock_s)
 
 
 def test_state_at_the_time_of_transmission_is_rtklibs(data_dir: Path, tmp_path: Path) -> None:

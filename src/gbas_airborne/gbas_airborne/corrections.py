@@ -21,7 +21,7 @@ from gbas_airborne.params import AirborneParams
 from gbas_airborne.reception import Corrections, EphemerisChecks, StationData
 from gbas_core.ephemeris import Ephemeris
 from gbas_core.gpstime import seconds_between
-from gbas_core.orbits import transmit_state
+from gbas_core.orbits import transmit_place
 from gbas_core.record import FloatArray
 from gbas_core.satellites import missing, satellites_of
 from gbas_core.signals import SPEED_OF_LIGHT_MPS
@@ -194,7 +194,7 @@ def ranging_sources(
     age_s = seconds_between(corrections.gps_week, corrections.tow_s, gps_week, tow_s)
     rules = _rules(ranges, station, corrections, age_s, ephemeris, ephemeris_crc, checks, params)
     reason = first_reason(rules)
-    satellite = transmit_state(ephemeris, gps_week, tow_s, ranges.code_m)
+    satellite = transmit_place(ephemeris, gps_week, tow_s, ranges.code_m)
     factor = np.ones(tracked.shape)
     if params.inflate_unsettled:
         factor = settling_factor(ranges.settled_s, params.smoothing_tau_s)

@@ -56,13 +56,43 @@ class SatelliteState:
     clock_drift: FloatArray
 
 
+class SatellitePlace(NamedTuple):
+    """Position and clock of :class:`SatelliteState` alone: half the work."""
+
+    position_m: FloatArray
+    clock_s: FloatArray
+
+
 class _Anomaly(NamedTuple):
-    """Eccentric anomaly and what follows from it, each (..., N_SATS)."""
+    """Eccentric anomaly and what follows from it, each (..., N_SATS); the mean motion is (N_SATS,)."""
 
     since_toe_s: FloatArray
     sin_e: FloatArray
     cos_e: FloatArray
-    rate_radps: FloatArray
+    distance: FloatArray
+    """Distance over semi-major axis, ``1 - e cos E``."""
+    motion_radps: FloatArray
+
+    @property
+    def rate_radps(self) -> FloatArray:
+        """Rate of the eccentric anomaly."""
+        return self.motion_radps / self.distance
+
+
+class _Orbit(NamedTuple):
+    """Position in the orbital plane and the plane's orientation, each (..., N_SATS) (table 20-IV)."""
+
+    sin_2: FloatArray
+    cos_2: FloatArray
+    x: FloatArray
+    y: FloatArray
+    cos_u: FloatArray
+    sin_u: FloatArray
+    cos_i: FloatArray
+    sin_i: FloatArray
+    cos_node: FloatArray
+    sin_node: FloatArray
+    node_rate: FloatArray
 
 
 def group_delay_s(ephemeris: Ephemeris, band: int | None = L1) -> FloatArray:
@@ -109,18 +139,22 @@ def _eccentric_anomaly(ephemeris: Ephemeris, gps_week: int, tow_tx_s: ArrayLike)
     for _ in range(_KEPLER_STEPS):
         anomaly = anomaly - (anomaly - e * np.sin(anomaly) - mean) / (1.0 - e * np.cos(anomaly))
     cos_e = np.cos(anomaly)
-    return _Anomaly(since_toe, np.sin(anomaly), cos_e, motion / (1.0 - e * cos_e))
+    return _Anomaly(since_toe, np.sin(anomaly), cos_e, 1.0 - e * cos_e, motion)
 
 
-def _clock(
+def _clock_s(
     ephemeris: Ephemeris, gps_week: int, tow_tx_s: ArrayLike, anomaly: _Anomaly, band: int | None
-) -> tuple[FloatArray, FloatArray]:
+) -> FloatArray:
     since_toc = _seconds_since(ephemeris.toc_week, ephemeris.toc_tow_s, gps_week, tow_tx_s)
     polynomial = ephemeris.af0_s + since_toc * (ephemeris.af1_sps + since_toc * ephemeris.af2_sps2)
     relativity = RELATIVISTIC_F * ephemeris.e * ephemeris.sqrt_a
-    bias = polynomial + relativity * anomaly.sin_e - group_delay_s(ephemeris, band)
-    drift = ephemeris.af1_sps + 2.0 * ephemeris.af2_sps2 * since_toc + relativity * anomaly.cos_e * anomaly.rate_radps
-    return bias, drift
+    return polynomial + relativity * anomaly.sin_e - group_delay_s(ephemeris, band)
+
+
+def _clock_drift(ephemeris: Ephemeris, gps_week: int, tow_tx_s: ArrayLike, anomaly: _Anomaly) -> FloatArray:
+    since_toc = _seconds_since(ephemeris.toc_week, ephemeris.toc_tow_s, gps_week, tow_tx_s)
+    relativity = RELATIVISTIC_F * ephemeris.e * ephemeris.sqrt_a
+    return ephemeris.af1_sps + 2.0 * ephemeris.af2_sps2 * since_toc + relativity * anomaly.cos_e * anomaly.rate_radps
 
 
 def satellite_clock_s(ephemeris: Ephemeris, gps_week: int, tow_tx_s: ArrayLike, band: int | None = L1) -> FloatArray:
@@ -140,58 +174,77 @@ def satellite_clock_s(ephemeris: Ephemeris, gps_week: int, tow_tx_s: ArrayLike, 
     -------
     (..., N_SATS) array
     """
-    return _clock(ephemeris, gps_week, tow_tx_s, _eccentric_anomaly(ephemeris, gps_week, tow_tx_s), band)[0]
+    return _clock_s(ephemeris, gps_week, tow_tx_s, _eccentric_anomaly(ephemeris, gps_week, tow_tx_s), band)
 
 
 def satellite_state(ephemeris: Ephemeris, gps_week: int, tow_tx_s: ArrayLike, band: int | None = L1) -> SatelliteState:
     """Position, velocity and clock at times of transmission in system time; arguments as :func:`satellite_clock_s`."""
     anomaly = _eccentric_anomaly(ephemeris, gps_week, tow_tx_s)
-    in_plane, in_plane_rate, inclination, inclination_rate = _orbital_plane(ephemeris, anomaly)
-    node_rate = ephemeris.omega_dot_radps - EARTH_RATE_RADPS
-    node = ephemeris.omega0_rad + node_rate * anomaly.since_toe_s - EARTH_RATE_RADPS * ephemeris.toe_tow_s
-    sin_node, cos_node = np.sin(node), np.cos(node)
-    sin_i, cos_i = np.sin(inclination), np.cos(inclination)
-    (x, y), (x_rate, y_rate) = in_plane, in_plane_rate
-
-    position = np.empty((*x.shape[:-1], 3, x.shape[-1]))
-    position[..., 0, :] = x * cos_node - y * cos_i * sin_node
-    position[..., 1, :] = x * sin_node + y * cos_i * cos_node
-    position[..., 2, :] = y * sin_i
-    across = y_rate * cos_i - y * sin_i * inclination_rate
-    velocity = np.empty_like(position)
-    velocity[..., 0, :] = x_rate * cos_node - across * sin_node - node_rate * position[..., 1, :]
-    velocity[..., 1, :] = x_rate * sin_node + across * cos_node + node_rate * position[..., 0, :]
-    velocity[..., 2, :] = y_rate * sin_i + y * cos_i * inclination_rate
-    clock, drift = _clock(ephemeris, gps_week, tow_tx_s, anomaly, band)
-    return SatelliteState(position_m=position, velocity_mps=velocity, clock_s=clock, clock_drift=drift)
+    orbit = _orbit(ephemeris, anomaly)
+    position = _position_m(orbit)
+    return SatelliteState(
+        position_m=position,
+        velocity_mps=_velocity_mps(ephemeris, anomaly, orbit, position),
+        clock_s=_clock_s(ephemeris, gps_week, tow_tx_s, anomaly, band),
+        clock_drift=_clock_drift(ephemeris, gps_week, tow_tx_s, anomaly),
+    )
 
 
-_Pair = tuple[FloatArray, FloatArray]
-
-
-def _orbital_plane(ephemeris: Ephemeris, anomaly: _Anomaly) -> tuple[_Pair, _Pair, FloatArray, FloatArray]:
-    """Corrected position and velocity in the orbital plane, inclination and its rate (table 20-IV)."""
+def _orbit(ephemeris: Ephemeris, anomaly: _Anomaly) -> _Orbit:
     eph, e = ephemeris, ephemeris.e
     root = np.sqrt(1.0 - e**2)
-    denominator = 1.0 - e * anomaly.cos_e
     phase = np.arctan2(root * anomaly.sin_e, anomaly.cos_e - e) + eph.omega_rad
-    phase_rate = root * anomaly.rate_radps / denominator
     sin_2, cos_2 = np.sin(2.0 * phase), np.cos(2.0 * phase)
-    twice_rate = 2.0 * phase_rate
-
     latitude = phase + eph.cus_rad * sin_2 + eph.cuc_rad * cos_2
-    latitude_rate = phase_rate + twice_rate * (eph.cus_rad * cos_2 - eph.cuc_rad * sin_2)
-    semi_major = eph.sqrt_a**2
-    radius = semi_major * denominator + eph.crs_m * sin_2 + eph.crc_m * cos_2
-    radius_rate = semi_major * e * anomaly.sin_e * anomaly.rate_radps
-    radius_rate = radius_rate + twice_rate * (eph.crs_m * cos_2 - eph.crc_m * sin_2)
+    radius = eph.sqrt_a**2 * anomaly.distance + eph.crs_m * sin_2 + eph.crc_m * cos_2
     inclination = eph.i0_rad + eph.idot_radps * anomaly.since_toe_s + eph.cis_rad * sin_2 + eph.cic_rad * cos_2
-    inclination_rate = eph.idot_radps + twice_rate * (eph.cis_rad * cos_2 - eph.cic_rad * sin_2)
-
+    node_rate = eph.omega_dot_radps - EARTH_RATE_RADPS
+    node = eph.omega0_rad + node_rate * anomaly.since_toe_s - EARTH_RATE_RADPS * eph.toe_tow_s
     sin_u, cos_u = np.sin(latitude), np.cos(latitude)
-    x, y = radius * cos_u, radius * sin_u
-    x_rate, y_rate = radius_rate * cos_u - y * latitude_rate, radius_rate * sin_u + x * latitude_rate
-    return (x, y), (x_rate, y_rate), inclination, inclination_rate
+    return _Orbit(
+        sin_2=sin_2,
+        cos_2=cos_2,
+        x=radius * cos_u,
+        y=radius * sin_u,
+        cos_u=cos_u,
+        sin_u=sin_u,
+        cos_i=np.cos(inclination),
+        sin_i=np.sin(inclination),
+        cos_node=np.cos(node),
+        sin_node=np.sin(node),
+        node_rate=node_rate,
+    )
+
+
+def _position_m(orbit: _Orbit) -> FloatArray:
+    x, y = orbit.x, orbit.y
+    position = np.empty((*x.shape[:-1], 3, x.shape[-1]))
+    position[..., 0, :] = x * orbit.cos_node - y * orbit.cos_i * orbit.sin_node
+    position[..., 1, :] = x * orbit.sin_node + y * orbit.cos_i * orbit.cos_node
+    position[..., 2, :] = y * orbit.sin_i
+    return position
+
+
+def _velocity_mps(ephemeris: Ephemeris, anomaly: _Anomaly, orbit: _Orbit, position_m: FloatArray) -> FloatArray:
+    """Time derivative of the position."""
+    eph, e = ephemeris, ephemeris.e
+    x, y, sin_2, cos_2 = orbit.x, orbit.y, orbit.sin_2, orbit.cos_2
+    phase_rate = np.sqrt(1.0 - e**2) * anomaly.rate_radps / anomaly.distance
+    twice_rate = 2.0 * phase_rate
+    latitude_rate = phase_rate + twice_rate * (eph.cus_rad * cos_2 - eph.cuc_rad * sin_2)
+    radius_rate = eph.sqrt_a**2 * e * anomaly.sin_e * anomaly.rate_radps
+    radius_rate = radius_rate + twice_rate * (eph.crs_m * cos_2 - eph.crc_m * sin_2)
+    inclination_rate = eph.idot_radps + twice_rate * (eph.cis_rad * cos_2 - eph.cic_rad * sin_2)
+    x_rate = radius_rate * orbit.cos_u - y * latitude_rate
+    y_rate = radius_rate * orbit.sin_u + x * latitude_rate
+
+    across = y_rate * orbit.cos_i - y * orbit.sin_i * inclination_rate
+    node_rate, sin_node, cos_node = orbit.node_rate, orbit.sin_node, orbit.cos_node
+    velocity = np.empty_like(position_m)
+    velocity[..., 0, :] = x_rate * cos_node - across * sin_node - node_rate * position_m[..., 1, :]
+    velocity[..., 1, :] = x_rate * sin_node + across * cos_node + node_rate * position_m[..., 0, :]
+    velocity[..., 2, :] = y_rate * orbit.sin_i + y * orbit.cos_i * inclination_rate
+    return velocity
 
 
 def transmit_state(
@@ -210,10 +263,27 @@ def transmit_state(
     pseudorange_m : (..., N_SATS) array
         Pseudoranges of `band` [m].
     """
+    return satellite_state(ephemeris, gps_week, _transmit_tow_s(ephemeris, gps_week, tow_rx_s, pseudorange_m), band)
+
+
+def transmit_place(
+    ephemeris: Ephemeris, gps_week: int, tow_rx_s: ArrayLike, pseudorange_m: FloatArray, band: int | None = L1
+) -> SatellitePlace:
+    """Position and clock of :func:`transmit_state`, to the same bits."""
+    tow_tx = _transmit_tow_s(ephemeris, gps_week, tow_rx_s, pseudorange_m)
+    anomaly = _eccentric_anomaly(ephemeris, gps_week, tow_tx)
+    return SatellitePlace(
+        position_m=_position_m(_orbit(ephemeris, anomaly)),
+        clock_s=_clock_s(ephemeris, gps_week, tow_tx, anomaly, band),
+    )
+
+
+def _transmit_tow_s(ephemeris: Ephemeris, gps_week: int, tow_rx_s: ArrayLike, pseudorange_m: FloatArray) -> FloatArray:
+    """System time of transmission."""
     tow_sv = np.asarray(tow_rx_s, dtype=np.float64) - pseudorange_m / SPEED_OF_LIGHT_MPS
     since_toc = _seconds_since(ephemeris.toc_week, ephemeris.toc_tow_s, gps_week, tow_sv)
     clock = ephemeris.af0_s + since_toc * (ephemeris.af1_sps + since_toc * ephemeris.af2_sps2)
-    return satellite_state(ephemeris, gps_week, tow_sv - clock, band)
+    return np.asarray(tow_sv - clock)
 
 
 def rotated_range(receiver_xyz_m: FloatArray, sat_xyz_m: FloatArray) -> tuple[FloatArray, FloatArray]:

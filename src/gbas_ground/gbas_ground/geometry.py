@@ -9,7 +9,7 @@ import numpy as np
 
 from gbas_core.ephemeris import Ephemeris
 from gbas_core.frames import rot_enu_ecef
-from gbas_core.orbits import rotated_range, transmit_state
+from gbas_core.orbits import rotated_range, transmit_place
 from gbas_core.record import FloatArray
 from gbas_core.signals import L1
 from gbas_ground.params import GroundParams
@@ -67,7 +67,7 @@ def expected(
         Band of the pseudoranges.
     """
     own = np.concatenate([code_m, np.full((1, code_m.shape[-1]), np.nan)])
-    state = transmit_state(ephemeris, gps_week, tow_s, np.where(np.isfinite(own), own, _MEAN_RANGE_M), band)
+    state = transmit_place(ephemeris, gps_week, tow_s, np.where(np.isfinite(own), own, _MEAN_RANGE_M), band)
     range_m, los = rotated_range(site.positions_m, state.position_m)
     up = los[-1, 0] * site.up[0] + los[-1, 1] * site.up[1] + los[-1, 2] * site.up[2]
     return Expected(range_m[:-1], state.clock_s[:-1], np.arcsin(up))
