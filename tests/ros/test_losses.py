@@ -207,7 +207,7 @@ def test_replay_names_the_readers_it_misses(launcher: Any, files: dict[str, Any]
 
 def test_replay_says_who_stalls(launcher: Any, probe: Any, files: dict[str, Any]) -> None:
     """A reader that dies in the middle ends the replay with its name, not with a wait for ever."""
-    readers = {"wait_for": [], "stall_s": 2.0, "start_wait_s": 60.0, "window_epochs": 4, "user_file": ""}
+    readers = {"wait_for": [], "stall_s": 10.0, "start_wait_s": 60.0, "window_epochs": 4, "user_file": ""}
     monitor = launcher.start("gbas_ground.nodes.integrity_monitor", {"ground": STATION, "start_wait_s": 60.0})
     launcher.start("gbas_ground.nodes.correction_broadcast", {"ground": STATION, "start_wait_s": 60.0})
     bursts = probe.bursts()
@@ -215,14 +215,16 @@ def test_replay_says_who_stalls(launcher: Any, probe: Any, files: dict[str, Any]
     probe.until(lambda: len(bursts) > 20, "the replay under way")
     monitor.send(signal.SIGKILL)
     assert replay.wait(60.0) == 3
-    assert "no progress of correction_broadcast for 2 s" in replay.output
+    assert "no progress of correction_broadcast for 10 s" in replay.output
 
 
 def test_replay_of_a_station_alone_ends_in_order(launcher: Any, probe: Any, files: dict[str, Any]) -> None:
     events, bursts = probe.events(), probe.bursts()
     for node in ("integrity_monitor", "correction_broadcast"):
         launcher.start(f"gbas_ground.nodes.{node}", {"ground": STATION, "start_wait_s": 60.0})
-    replay = launcher.start(REPLAY, {**files, "user_file": "", "stop_s": 20.0, "start_wait_s": 60.0})
+    for topic in (topics.EPHEMERIS, *topics.GROUND_OBSERVATIONS[:2]):
+        probe.listen(topic)
+    replay = launcher.start(REPLAY, {**files, "user_file": "", "stop_s": 20.0, **RECORDED})
     assert replay.wait(60.0) == 0, replay.output
     probe.until(lambda: events and events[-1].kind is EventKind.FINISHED, "the event of the end")
     assert events[-1].value == 21
