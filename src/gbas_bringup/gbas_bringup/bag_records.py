@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -42,7 +43,7 @@ def read_records(bag: Path, topics: Collection[str]) -> dict[str, list[Record]]:
         if topic not in records:
             continue
         try:
-            decoded = typestore().deserialize_cdr(message.data, epochs.TABLE_TYPE)
+            decoded: Any = typestore().deserialize_cdr(message.data, epochs.TABLE_TYPE)
             label = decoded.layout.dim[-1].label
             shape = [dimension.size for dimension in decoded.layout.dim]
             records[topic].append(tables.decode_table(label, np.reshape(decoded.data, shape)))

@@ -161,8 +161,8 @@ def error_statistics(rows: Sequence[Row], truth_m: np.ndarray, *, course_rad: fl
     if not used.size:
         return {"epochs": 0}
     horizontal, vertical, lateral = errors.horizontal_m[used], errors.vertical_m[used], errors.lateral_m[used]
-    vpl = np.array([rows[k].vpl_m for k in used])
-    lpl = np.array([rows[k].lpl_m for k in used])
+    vpl = np.array([row.vpl_m for row in rows])[used]
+    lpl = np.array([row.lpl_m for row in rows])[used]
     return {
         "epochs": int(used.size),
         "horizontal_rms_m": float(np.sqrt(np.mean(horizontal**2))),
