@@ -33,6 +33,7 @@ _BOUNDS: Final[dict[str, tuple[float, float]]] = {
     "correction_wait_s": (0.0, 10.0),
     "correction_timeout_s": (0.0, 10.0),
     "mt1_timeout_s": (0.0, 3.5),
+    "station_data_timeout_s": (10.0, 3600.0),
     "max_speed_mps": (0.0, 1000.0),
     "speed_history_s": (0.0, 120.0),
     "range_test_sigma": (1.0, 20.0),
@@ -87,6 +88,10 @@ class AirborneParams:
         Corrections older than this are not used [s]. Not above the standard's 10 s.
     mt1_timeout_s : float
         Guidance is lost without a valid type 1 message for this long [s]. Not above the standard's 3.5 s.
+    station_data_timeout_s : float
+        Station data and the approach are forgotten when they were not repeated for this long [s]. The standard has them
+        sent at least every 20 frames (10 s); ours is the rule to forget, so that what a station withdraws or changes is
+        not used for ever by an aircraft that misses the message. Data of another rate than 2 Hz have longer frames.
     max_speed_mps : float
         Speed taken for the ionospheric sigma while the own speed is not known [m/s]; 82 m/s is 160 kt.
     speed_history_s : float
@@ -132,6 +137,7 @@ class AirborneParams:
     correction_wait_s: float = 0.5
     correction_timeout_s: float = 10.0
     mt1_timeout_s: float = 3.5
+    station_data_timeout_s: float = 60.0
     max_speed_mps: float = 82.0
     speed_history_s: float = 3.5
     require_ephemeris_bound: bool = True

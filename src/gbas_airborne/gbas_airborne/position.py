@@ -30,6 +30,7 @@ from gbas_core.frames import azimuth_elevation, geodetic_from_ecef, rot_enu_ecef
 from gbas_core.orbits import rotated_range
 from gbas_core.record import FloatArray
 from gbas_core.satellites import IS_GALILEO, IS_GPS, missing
+from gbas_core.smoothing import TAU_100_S
 from gbas_core.wls import projection_matrix, vertical_lateral
 
 BoolArray = NDArray[np.bool_]
@@ -213,7 +214,9 @@ def _sky(inputs: PositionInputs, position: FloatArray, speed: Speed, params: Air
     scale = station.scale_height_m
     tropo = tropo_correction_m(station.refractivity, scale, elevation, height_above, mask_rad=mask)
     sigma_tropo = sigma_tropo_m(station.refractivity_uncertainty, scale, elevation, height_above, mask_rad=mask)
-    iono = sigma_iono_m(station.sigma_vig, elevation, distance, speed_mps, params.smoothing_tau_s, mask_rad=mask)
+    # The ground's corrections are smoothed over 100 s, whatever the aircraft does.
+    tau_s = max(params.smoothing_tau_s, TAU_100_S)
+    iono = sigma_iono_m(station.sigma_vig, elevation, distance, speed_mps, tau_s, mask_rad=mask)
     gnd = inputs.corrections.sigma_m
     return _Sky(
         range_m=range_m,

@@ -105,16 +105,21 @@ def protection_levels(solution: SolutionEpoch, multipliers: Multipliers) -> Prot
     gnd2 = np.where(used, solution.sigma_gnd_m**2, 0.0)
     other2 = np.where(used, solution.sigma_air_m**2 + solution.sigma_tropo_m**2 + solution.sigma_iono_m**2, 0.0)
     sigma = np.sqrt((s**2 * (gnd2 + other2)).sum(axis=-1))
-    separation = np.array([solution.d_vert_m, solution.d_lat_m])
+    separation = _not_negative(np.array([solution.d_vert_m, solution.d_lat_m]))
     h0 = multipliers.k_ffmd[int(n_receivers)] * sigma + separation
     h1 = np.full(2, np.nan) if single else h1_levels(s, solution.b_m, gnd2, other2, multipliers.k_md) + separation
-    ephemeris = np.where(used, solution.ephemeris_error_m, 0.0)
+    ephemeris = np.where(used, _not_negative(solution.ephemeris_error_m), 0.0)
     return ProtectionLevels(
         h0_m=h0,
         h1_m=h1,
         level_m=h0 if single else np.maximum(h0, h1),
         ephemeris_bound_m=np.max(np.abs(s) * ephemeris, axis=-1) + solution.k_md_e * sigma,
     )
+
+
+def _not_negative(values: FloatArray) -> FloatArray:
+    """Sizes; a negative one is none, and missing."""
+    return np.where(values >= 0.0, values, np.nan)
 
 
 def receivers_behind(b_m: FloatArray) -> FloatArray:

@@ -28,7 +28,7 @@ from gbas_airborne.reception import SOURCE, ReceptionState, reception_step
 from gbas_airborne.service import ServiceState, service_step
 from gbas_core.ephemeris import Ephemeris, EphemerisStore
 from gbas_core.gpstime import epoch_key, seconds_between
-from gbas_core.observations import ObservationEpoch
+from gbas_core.observations import LARGEST_OBSERVATION, ObservationEpoch
 from gbas_core.record import FloatArray
 from gbas_core.satellites import SAT_IDS, missing
 from gbas_core.signals import L1
@@ -231,7 +231,8 @@ def _in_order(state: PositionState, epoch: AirborneEpoch, log: _Log) -> tuple[Po
     refused = state.refused + 1 if state.refused and key > state.refused_key else 1
     if refused >= RESTART_AFTER_REFUSED:
         log.add(EventKind.INPUT, "observations", "time_restart", back_s)
-        return PositionState(), True
+        # what was received stays true; it is not sent again
+        return PositionState(ephemerides=state.ephemerides), True
     log.add(EventKind.INPUT, "observations", "time_backwards", back_s, 0.0)
     return replace(state, refused=refused, refused_key=key), False
 
@@ -269,10 +270,7 @@ def _match_ephemerides(own: OwnEphemerides, iod: FloatArray, epoch: AirborneEpoc
 def _observations(epoch: AirborneEpoch) -> ObservationEpoch | None:
     """The observations, if they are those of the epoch."""
     observations = epoch.observations
-    if observations is None:
-        return None
-    same = epoch_key(observations.gps_week, observations.tow_s) == epoch_key(epoch.gps_week, epoch.tow_s)
-    return observations if same else None
+    return observations if observations is not None and observations.is_of(epoch.gps_week, epoch.tow_s) else None
 
 
 def _track(
@@ -319,7 +317,7 @@ def _filter_params(params: AirborneParams) -> tuple[SlipParams, SmoothingParams]
 
 
 def _finite(values: FloatArray) -> FloatArray:
-    return np.where(np.isfinite(values), values, np.nan)
+    return np.where(np.abs(values) <= LARGEST_OBSERVATION, values, np.nan)
 
 
 # --- position

@@ -117,20 +117,29 @@ class ReceptionState:
         Frame of the last good block of that station.
     type2 : Type2 or None
         The message `station` was made of.
-    type1_received : (week, tow_s) or None
-        Frame of the last complete set of corrections.
+    type2_received, type4_received, type1_received : (week, tow_s) or None
+        Frames of the last station data, of the last data of the selected approach, and of the last complete set of
+        corrections.
+    pending_pair, pending_frame
+        First half of a linked pair, and the frame it came in.
+    type11, type11_frame
+        The 30 s corrections of one frame, and which.
     """
 
     station_id: str | None = None
     heard: tuple[int, float] | None = None
     station: StationData | None = None
     type2: Type2 | None = None
+    type2_received: tuple[int, float] | None = None
     approach: FinalApproach | None = None
+    type4_received: tuple[int, float] | None = None
     corrections: Corrections | None = None
     type1_received: tuple[int, float] | None = None
     checks: EphemerisChecks = field(default_factory=EphemerisChecks)
     pending_pair: Type1 | None = None
+    pending_frame: tuple[int, float] | None = None
     type11: tuple[Type11, ...] = ()
+    type11_frame: tuple[int, float] | None = None
     waiting: tuple[Burst, ...] = ()
     counts: Counts = field(default_factory=Counts)
 
@@ -168,6 +177,7 @@ def reception_step(
     intake.count(failed=malformed)
     for burst in ready:
         intake.take(burst)
+    intake.expire()
     return intake.finished(), tuple(intake.events)
 
 
@@ -188,8 +198,27 @@ class _Intake:
         for name, increment in increments.items():
             self._counts[name] += increment
 
+    def expire(self) -> None:
+        """Forget station and approach data that were not repeated for too long: they may have been withdrawn."""
+        limit_s = self.params.station_data_timeout_s
+        age_s = self._age_of(self.state.type2_received)
+        if age_s > limit_s:
+            self._forget("station_data_timeout", age_s, limit_s)
+        age_s = self._age_of(self.state.type4_received)
+        if age_s > limit_s:
+            self._event(EventKind.STATION, f"rpds{self.params.rpds}", "approach_timeout", age_s, limit_s)
+            self.state = replace(self.state, approach=None, type4_received=None)
+
+    def _age_of(self, received: tuple[int, float] | None) -> float:
+        return math.nan if received is None else seconds_between(*received, *self._epoch)
+
     def take(self, burst: Burst) -> None:
-        """One burst: its good blocks, in order."""
+        """One burst: its good blocks, in order. One of a frame before the last of our station comes too late."""
+        heard = self.state.heard
+        if heard is not None and _age_s(heard, burst) < 0.0:
+            self.count(bursts=1, unusable=1)
+            self._event(EventKind.INPUT, "vdb", "burst_out_of_order", _age_s(heard, burst), 0.0)
+            return
         decoded = decode_burst(burst)
         self.count(bursts=1, failed=len(decoded.errors), corrected_bytes=decoded.corrected_bytes)
         if decoded.errors:
@@ -221,8 +250,7 @@ class _Intake:
         elif isinstance(message, Type4):
             self._take_type4(message, burst)
         elif isinstance(message, Type11):
-            kept = tuple(m for m in self.state.type11 if m.modified_z_count_s == message.modified_z_count_s)
-            self.state = replace(self.state, type11=(*kept[-1:], message))
+            self._take_type11(message, burst)
         heard = (burst.gps_week, burst.tow_s)
         if self.state.station_id == block.station_id and self.state.heard != heard:
             self.state = replace(self.state, heard=heard)
@@ -269,7 +297,9 @@ class _Intake:
         known = self.state.station_id
         if known is not None and station_id != known:
             self._forget("station_changed")
+        received = (burst.gps_week, burst.tow_s)
         if known == station_id and message == self.state.type2:
+            self.state = replace(self.state, type2_received=received)
             return
         station = _station_data(message)
         old = self.state.station
@@ -280,7 +310,7 @@ class _Intake:
             self._event(EventKind.STATION, station_id, "station_selected", float(station.gcid))
         elif old.gcid != station.gcid:
             self._event(EventKind.STATION, station_id, "gcid_changed", float(station.gcid), float(old.gcid))
-        self.state = replace(self.state, station_id=station_id, station=station, type2=message)
+        self.state = replace(self.state, station_id=station_id, station=station, type2=message, type2_received=received)
 
     def _take_type1(self, message: Type1, burst: Burst) -> None:
         if message.measurement_type != L1_CA_MEASUREMENT:
@@ -291,20 +321,29 @@ class _Intake:
             self._drop_pending()
             self._take_corrections(message.modified_z_count_s, message.measurements, burst)
             return
-        pending = self.state.pending_pair
+        frame, pending = (burst.gps_week, burst.tow_s), self.state.pending_pair
         flags = (pending.additional_message_flag, message.additional_message_flag) if pending else ()
-        if pending and sorted(flags) == [1, 3] and pending.modified_z_count_s == message.modified_z_count_s:
-            self.state = replace(self.state, pending_pair=None)
+        # Both are sent in one frame. The Z-count alone does not tell: it is the same again after 20 minutes.
+        matches = self.state.pending_frame == frame and sorted(flags) == [1, 3]
+        if pending and matches and pending.modified_z_count_s == message.modified_z_count_s:
+            self.state = replace(self.state, pending_pair=None, pending_frame=None)
             self._take_corrections(message.modified_z_count_s, pending.measurements + message.measurements, burst)
             return
         self._drop_pending()
-        self.state = replace(self.state, pending_pair=message)
+        self.state = replace(self.state, pending_pair=message, pending_frame=frame)
+
+    def _take_type11(self, message: Type11, burst: Burst) -> None:
+        """The 30 s corrections of one frame: a message, or a linked pair."""
+        frame = (burst.gps_week, burst.tow_s)
+        kept = self.state.type11[-1:] if self.state.type11_frame == frame else ()
+        kept = tuple(m for m in kept if m.modified_z_count_s == message.modified_z_count_s)
+        self.state = replace(self.state, type11=(*kept, message), type11_frame=frame)
 
     def _drop_pending(self) -> None:
         """Half of a linked pair whose other half did not come is never used."""
         if self.state.pending_pair is not None:
             self.count(unpaired=1)
-            self.state = replace(self.state, pending_pair=None)
+            self.state = replace(self.state, pending_pair=None, pending_frame=None)
 
     def _take_ephemeris_check(self, message: Type1) -> None:
         if not message.measurements or message.ephemeris_crc is None:
@@ -350,7 +389,8 @@ class _Intake:
                     self._event(EventKind.INPUT, subject, refused, math.nan)
                 elif not _same(approach, self.state.approach):
                     self._event(EventKind.STATION, subject, "approach_received", float(self.params.rpds))
-                self.state = replace(self.state, approach=approach)
+                received = (burst.gps_week, burst.tow_s) if approach is not None else None
+                self.state = replace(self.state, approach=approach, type4_received=received)
 
     def _approach(self, data_set: FasDataSet) -> tuple[FinalApproach | None, str]:
         """The approach of a FAS data set, or None and why not."""

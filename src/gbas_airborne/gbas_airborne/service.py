@@ -145,8 +145,8 @@ def _position_failure(solution: SolutionEpoch, params: AirborneParams) -> Failur
         return Failure(valid, "correction_age", solution.correction_age_s, params.correction_timeout_s)
     if not math.isfinite(solution.x_m + solution.y_m + solution.z_m):
         return Failure(valid, "no_position", solution.n_sats, math.nan)
-    if params.require_ephemeris_bound and math.isnan(solution.k_md_e):
-        return Failure(valid, "no_ephemeris_bound", math.nan, math.nan)
+    if params.require_ephemeris_bound and not solution.k_md_e > 0.0:
+        return Failure(valid, "no_ephemeris_bound", solution.k_md_e, math.nan)
     return None
 
 

@@ -292,10 +292,12 @@ def _airborne_values(request: ProcessRequest, recording: Recording, ground: Grou
     for key in ("/**", "ros__parameters", "airborne"):
         document = document.get(key, document)
     assert recording.user is not None
+    interval_s = max(file.interval_s or 0.0 for file in recording.ground)
     values: dict[str, Any] = {
         "service": request.service,
         "systems": request.systems,
         "max_gap_s": max(3.5, 1.5 * (recording.user.interval_s or 0.0)),
+        "station_data_timeout_s": min(max(60.0, 30.0 * interval_s), 3600.0),  # they come round in 20 epochs
     }
     if ground.approaches:
         values["rpds"] = ground.approaches[0].rpds

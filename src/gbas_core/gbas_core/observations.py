@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
+from gbas_core.gpstime import epoch_key
 from gbas_core.record import FloatArray, Record, per_satellite, scalar
 from gbas_core.signals import BANDS
+
+LARGEST_OBSERVATION: Final = 1e12
+"""No receiver measures more, in whatever unit: beyond it a number is damage, and would only overflow."""
 
 
 def _by_band(quantity: str, unit_suffix: str) -> tuple[str, ...]:
@@ -36,3 +42,9 @@ class ObservationEpoch(Record):
         """Whether no satellite has any value: the receiver has nothing to say for this epoch, as if it were absent."""
         values = (self.code_m, self.carrier_m, self.doppler_hz, self.cn0_dbhz, self.lli)
         return all(bool(np.isnan(each).all()) for each in values)
+
+    def is_of(self, gps_week: int, tow_s: float) -> bool:
+        """Whether the time tag is that epoch, to the millisecond; a tag that is no time never is."""
+        if not (math.isfinite(self.gps_week) and math.isfinite(self.tow_s)):
+            return False
+        return epoch_key(self.gps_week, self.tow_s) == epoch_key(gps_week, tow_s)

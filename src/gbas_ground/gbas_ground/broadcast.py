@@ -6,7 +6,7 @@ the air with an empty type 1 message and says that it is not healthy.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Final
 
@@ -33,6 +33,9 @@ from gbas_msgs_py.vdb.schedule import (
 
 _FRAME_MS: Final = round(1000 * FRAME_DURATION_S)
 _IOD_MODULUS: Final = 256
+_MAX_CRC: Final = 0xFFFF
+RESTART_AFTER_REFUSED: Final = 10
+"""Epochs refused, each later than the one before, after which the station believes them and starts anew. Ours."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -44,10 +47,19 @@ class BroadcastState:
     schedule : ScheduleState
     key : int or None
         Epoch of the last frame [ms since the start of GPS time].
+    refused, refused_key : int
+        Epochs refused in a row because they were not later than that, and the last of them.
     """
 
     schedule: ScheduleState = field(default_factory=ScheduleState)
     key: int | None = None
+    refused: int = 0
+    refused_key: int = 0
+
+
+def refused_in_a_row(refused: int, refused_key: int, key: int) -> int:
+    """How many epochs were refused in a row with this one, of which each is later than the one before."""
+    return refused + 1 if refused > 0 and key > refused_key else 1
 
 
 def empty_integrity(gps_week: int, tow_s: float) -> IntegrityEpoch:
@@ -58,7 +70,8 @@ def empty_integrity(gps_week: int, tow_s: float) -> IntegrityEpoch:
 def broadcastable(integrity: IntegrityEpoch, params: GroundParams) -> BoolArray:
     """Satellites whose corrections are usable, complete and within what the messages can carry, ``(N,)``."""
     b = np.where(np.isnan(integrity.b_m), 0.0, np.abs(integrity.b_m)).max(axis=0)
-    ok = (integrity.state == ChannelState.USABLE) & np.isfinite(integrity.iod) & np.isfinite(integrity.ephemeris_crc)
+    ok = (integrity.state == ChannelState.USABLE) & _counts(integrity.iod) & _counts(integrity.ephemeris_crc)
+    ok = ok & (integrity.ephemeris_crc <= _MAX_CRC)
     for prc, rrc in (
         (integrity.prc_100_m, integrity.rrc_100_mps),
         (integrity.prc_30_m, integrity.rrc_30_mps),
@@ -67,6 +80,11 @@ def broadcastable(integrity: IntegrityEpoch, params: GroundParams) -> BoolArray:
     for sigma in (integrity.sigma_pr_gnd_m, integrity.sigma_pr_gnd_d_m, integrity.sigma_pr_gnd_30_m):
         ok = ok & (sigma > 0.0) & (sigma <= MAX_SIGMA_M)
     return np.asarray(ok & (b <= MAX_B_VALUE_M))
+
+
+def _counts(values: FloatArray) -> BoolArray:
+    """Where the values are whole numbers that are not negative."""
+    return np.asarray((values >= 0.0) & (values == np.floor(values)) & np.isfinite(values))
 
 
 @lru_cache(maxsize=8)
@@ -82,12 +100,17 @@ def broadcast_frame(
 ) -> tuple[BroadcastState, tuple[Burst, ...]]:
     """Bursts of the frame that begins at the integrity's epoch.
 
-    An epoch that is not later than the last frame, or is not at the start of a frame, gives no bursts. When more
-    satellites are usable than the slots hold, the lowest are left out.
+    An epoch that is not later than the last frame, or is not at the start of a frame, gives no bursts; time that goes
+    on from an earlier epoch is believed in the end. When more satellites are usable than the slots hold, the lowest are
+    left out.
     """
     key = epoch_key(integrity.gps_week, integrity.tow_s)
-    if key % _FRAME_MS or (state.key is not None and key <= state.key):
+    if key % _FRAME_MS:
         return state, ()
+    if state.key is not None and key <= state.key:
+        refused = refused_in_a_row(state.refused, state.refused_key, key)
+        if refused < RESTART_AFTER_REFUSED:
+            return replace(state, refused=refused, refused_key=key), ()
     healthy, unhealthy, approaches, schedule, room = _constants(params)
     usable = broadcastable(integrity, params)
     serves = bool(integrity.n_receivers >= params.min_receivers)

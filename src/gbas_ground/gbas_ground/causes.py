@@ -33,7 +33,7 @@ class ExclusionCause(IntEnum):
     B_VALUE = 32
     """A B value above its threshold (multiple reference consistency check)."""
     RECEIVER_FAULT = 33
-    """Several channels of one receiver failed by B values."""
+    """Several channels of one receiver failed by B values, or against their expected ranges."""
     PRC_LIMIT = 34
     """Pseudorange correction above its limit."""
     RRC_LIMIT = 35

@@ -239,8 +239,8 @@ class GroundParams:
     max_rrc_mps: float = _parameter("monitors", "max_rrc_mps", 3.4, "m/s", "limit of |RRC|", low=0.01, high=32.767)
     k_b: float = _parameter("monitors", "k_b", 5.5, "-", "multiplier of the B value threshold", low=1.0, high=20.0)
     receiver_fault_channels: int = _parameter(
-        "monitors", "receiver_fault_channels", 3, "-", "channels failing by B values that make the receiver the fault",
-        low=1, high=68,
+        "monitors", "receiver_fault_channels", 3, "-",
+        "channels failing by B values, or by their ranges, that make the receiver the fault", low=1, high=68,
     )  # fmt: skip
     readmission_time_s: float = _parameter(
         "monitors",

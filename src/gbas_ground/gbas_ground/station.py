@@ -9,13 +9,19 @@ from typing import Final
 import numpy as np
 
 from gbas_core.ephemeris import Ephemeris
-from gbas_core.gpstime import epoch_key
+from gbas_core.gpstime import epoch_key, seconds_between
 from gbas_core.observations import ObservationEpoch
 from gbas_core.record import FloatArray
 from gbas_core.satellites import N_SATS, SAT_IDS, satellites_of
 from gbas_core.signals import L1, SPEED_OF_LIGHT_MPS
 from gbas_ground import ephemerides
-from gbas_ground.broadcast import BroadcastState, broadcast_frame, empty_integrity
+from gbas_ground.broadcast import (
+    RESTART_AFTER_REFUSED,
+    BroadcastState,
+    broadcast_frame,
+    empty_integrity,
+    refused_in_a_row,
+)
 from gbas_ground.causes import ExclusionCause
 from gbas_ground.condition import Condition, conclude, integrity_of
 from gbas_ground.consistency import Corrections, Exclusions, Finding, Measured, agree, no_exclusions, standing
@@ -33,8 +39,6 @@ from gbas_msgs_py.records import ChannelState, IntegrityEpoch
 from gbas_msgs_py.vdb.burst import Burst
 
 SOURCE: Final = "ground_station"
-RESTART_AFTER_REFUSED: Final = 10
-"""Epochs refused, each later than the one before, after which the station believes them and starts anew. Ours."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -98,6 +102,8 @@ class MonitorState:
         :class:`ExclusionCause` at the last epoch.
     present : (R,) bool array
         Receivers that delivered the last epoch.
+    contributing : (R,) bool array
+        Receivers behind the corrections of the last epoch.
     serving : bool
         Whether there were corrections at the last epoch.
     """
@@ -112,6 +118,7 @@ class MonitorState:
     satellites: FloatArray
     causes: FloatArray
     present: BoolArray
+    contributing: BoolArray
     serving: bool
 
 
@@ -128,6 +135,7 @@ def initial_monitor_state(params: GroundParams) -> MonitorState:
         satellites=np.full(N_SATS, float(ChannelState.NOT_TRACKED)),
         causes=np.zeros(N_SATS),
         present=np.ones(params.n_receivers, dtype=bool),
+        contributing=np.zeros(params.n_receivers, dtype=bool),
         serving=False,
     )
 
@@ -238,9 +246,7 @@ class _Events:
 
 
 def _refused(state: MonitorState, epoch: GroundEpoch) -> int:
-    """Refused epochs in a row, of which each is later than the one before."""
-    later = state.refused > 0 and epoch_key(epoch.gps_week, epoch.tow_s) > state.refused_key
-    return state.refused + 1 if later else 1
+    return refused_in_a_row(state.refused, state.refused_key, epoch_key(epoch.gps_week, epoch.tow_s))
 
 
 def _admit(state: MonitorState, epoch: GroundEpoch, params: GroundParams, events: _Events) -> MonitorState | None:
@@ -271,6 +277,7 @@ def _process(
     tracked = np.isfinite(raw.code_m[:, L1] + raw.carrier_m[:, L1])
     checks = _channel_checks(raw, should, tracked, params)
     new_exclusions = _exclude_channels(exclusions, checks, events)
+    new_exclusions = _exclude_receivers(new_exclusions, checks[0][1], params, events)
     clean = _without(raw, checks[0][1].failed)
     tracking, tracks = track(state.tracking, clean, key, _comparable_range_m(should, changed), params)
 
@@ -292,6 +299,8 @@ def _process(
     condition = conclude(tracked, tracks, known, measured, made, new_exclusions, params)
     integrity = integrity_of(epoch.gps_week, epoch.tow_s, known, measured, made, condition)
     serving = bool((condition.state == ChannelState.USABLE).any())
+    contributing = (made.used & (condition.state == ChannelState.USABLE)).any(axis=1)
+    _contribution_events(state, contributing, raw, new_exclusions, events)
     _satellite_events(state, condition, serving, findings, events)
     before = Before(
         gps_week=epoch.gps_week,
@@ -311,6 +320,7 @@ def _process(
         satellites=condition.state,
         causes=condition.cause,
         present=raw.present,
+        contributing=contributing,
         serving=serving,
     )
     return new, integrity
@@ -330,11 +340,10 @@ def _ephemerides(
 
 def _of_this_epoch(epoch: GroundEpoch, events: _Events) -> tuple[ObservationEpoch | None, ...]:
     """The observations; one that carries another epoch does not count."""
-    key = epoch_key(epoch.gps_week, epoch.tow_s)
     result: list[ObservationEpoch | None] = []
     for row, each in enumerate(epoch.observations):
-        if each is not None and epoch_key(each.gps_week, each.tow_s) != key:
-            late_s = (epoch_key(each.gps_week, each.tow_s) - key) / 1000.0
+        if each is not None and not each.is_of(epoch.gps_week, epoch.tow_s):
+            late_s = seconds_between(epoch.gps_week, epoch.tow_s, each.gps_week, each.tow_s)
             events.add(EventKind.INPUT, f"rr{row + 1}", "wrong_epoch", late_s, 0.0)
             result.append(None)
         else:
@@ -345,6 +354,17 @@ def _of_this_epoch(epoch: GroundEpoch, events: _Events) -> tuple[ObservationEpoc
 def _receiver_events(state: MonitorState, raw: RawEpoch, events: _Events) -> None:
     for row in np.flatnonzero(raw.present != state.present):
         events.add(EventKind.INPUT, f"rr{row + 1}", "back" if raw.present[row] else "missing")
+
+
+def _contribution_events(
+    state: MonitorState, contributing: BoolArray, raw: RawEpoch, exclusions: Exclusions, events: _Events
+) -> None:
+    """Receivers that went out of the corrections, or came into them, without an event of their own."""
+    told = ~raw.present | exclusions.receivers.excluded
+    for row in np.flatnonzero(state.contributing & ~contributing & ~told):
+        events.add(EventKind.EXCLUSION, f"rr{row + 1}", "no_channels")
+    for row in np.flatnonzero(~state.contributing & contributing):
+        events.add(EventKind.READMISSION, f"rr{row + 1}", "used")
 
 
 def _released(exclusions: Exclusions, params: GroundParams, events: _Events) -> Exclusions:
@@ -381,6 +401,24 @@ def _exclude_channels(exclusions: Exclusions, checks: _Checks, events: _Events) 
             events.add(EventKind.EXCLUSION, f"rr{row + 1}/{SAT_IDS[satellite]}", cause.word, value, threshold)
         channels = exclude(channels, check.failed, cause)
     return replace(exclusions, channels=channels)
+
+
+def _exclude_receivers(
+    exclusions: Exclusions, residual: MonitorResult, params: GroundParams, events: _Events
+) -> Exclusions:
+    """Receivers far from the expected ranges on several satellites.
+
+    Then it is not the satellites but the receiver, its time tag or its position, and what is within the limit is wrong
+    too.
+    """
+    failures = residual.failed.sum(axis=1)
+    failed = failures >= params.receiver_fault_channels
+    if not failed.any():
+        return exclusions
+    for row in np.flatnonzero(failed & ~exclusions.receivers.excluded):
+        cause = ExclusionCause.RECEIVER_FAULT.word
+        events.add(EventKind.EXCLUSION, f"rr{row + 1}", cause, failures[row], params.receiver_fault_channels)
+    return replace(exclusions, receivers=exclude(exclusions.receivers, failed, ExclusionCause.RECEIVER_FAULT))
 
 
 def _without(raw: RawEpoch, failed: BoolArray) -> RawEpoch:

@@ -14,7 +14,7 @@ from typing import Any, Final, NamedTuple, TypeVar
 
 import numpy as np
 
-from gbas_core.observations import ObservationEpoch
+from gbas_core.observations import LARGEST_OBSERVATION, ObservationEpoch
 from gbas_core.record import FloatArray
 from gbas_core.satellites import missing
 from gbas_core.signals import L1, N_BANDS
@@ -40,12 +40,12 @@ class RawEpoch(NamedTuple):
 
 
 def stack(observations: Sequence[ObservationEpoch | None], satellites: BoolArray) -> RawEpoch:
-    """Bring the receivers' records of one epoch together; infinities and satellites not in use become missing."""
+    """Bring the receivers' records of one epoch together; nonsense and satellites not in use become missing."""
     nothing = missing(N_BANDS)
     arrays = []
     for name in ("code_m", "carrier_m", "doppler_hz", "cn0_dbhz", "lli"):
         values = np.stack([nothing if each is None else getattr(each, name) for each in observations])
-        arrays.append(np.where(np.isfinite(values) & satellites, values, np.nan))
+        arrays.append(np.where((np.abs(values) <= LARGEST_OBSERVATION) & satellites, values, np.nan))
     code, carrier, doppler, cn0, lli = arrays
     lli = np.where((lli < 0.0) | (lli > _MAX_LLI), 1.0, lli)  # an indicator that means nothing counts as lock lost
     present = np.array([each is not None for each in observations])
