@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from gbas_core.gpstime import epoch_key, from_epoch_key
 from gbas_msgs_py.joining import (
     MAX_WAITING_BURSTS,
+    RESTART_AFTER_LATE,
     AirborneJoiner,
     BurstQueue,
     EpochJoiner,
@@ -305,3 +306,41 @@ def test_negative_wait_is_refused() -> None:
     for wait_s in (-0.1, float("nan")):
         with pytest.raises(ValueError, match="correction_wait_s"):
             BurstQueue(wait_s)
+
+
+# --- a time that was wrong
+
+DAY_MS = 86_400_000
+
+
+def test_one_epoch_from_the_future_does_not_end_the_ground() -> None:
+    joiner: EpochJoiner[str] = EpochJoiner(["rr1", "rr2"], timeout_s=1.0)
+    given = []
+    for key in (START, START + 500 + DAY_MS, *range(START + 1000, START + 20_000, 500)):
+        given += [joined.key for source in ("rr1", "rr2") for joined in joiner.add(source, key, "x", 0.0)]
+    resumed = START + 1000 + 500 * (RESTART_AFTER_LATE - 1)
+    assert given == [START, START + 500 + DAY_MS, *range(resumed, START + 20_000, 500)]
+
+
+def test_one_epoch_from_the_future_does_not_end_the_aircraft() -> None:
+    joiner: AirborneJoiner[str] = AirborneJoiner(correction_wait_s=0.5, timeout_s=1.0)
+    given = []
+    for key in (START, START + 500 + DAY_MS, *range(START + 1000, START + 20_000, 500)):
+        given += joiner.add_observation(key, "x", 0.0)
+        given += joiner.add_burst(burst(key))
+    assert [each.key for each in given[:2]] == [START, START + 500 + DAY_MS]
+    assert given[-1].key == START + 19_500
+    assert len(given) >= 2 + 37 - RESTART_AFTER_LATE  # what was late while the time was still in doubt is lost
+    # the frame of its own epoch is waited for as before
+    assert all([epoch_key(b.gps_week, b.tow_s) for b in each.bursts] == [each.key] for each in given[-20:])
+
+
+def test_a_stream_that_comes_late_is_no_new_time() -> None:
+    joiner: EpochJoiner[str] = EpochJoiner(["rr1", "rr2"], timeout_s=1.0)
+    for k in range(40):
+        joiner.add("rr1", START + 500 * k, "x", 0.5 * k)
+        joiner.expire(0.5 * k + 10.0)
+        if k >= 3:
+            joiner.add("rr2", START + 500 * (k - 3), "y", 0.5 * k)
+    assert joiner.late["rr2"] == 37
+    assert joiner.last_key == START + 500 * 39

@@ -19,6 +19,9 @@ from gbas_msgs_py.vdb.burst import Burst
 T = TypeVar("T")
 
 FRAME_MS: Final = 500
+RESTART_AFTER_LATE: Final = 10
+"""Epochs that come too late, each later than the one before and nothing in time between, after which they are the time
+now: what came before them had a wrong time."""
 MAX_WAITING_BURSTS: Final = 4096
 """Bursts kept while no observation comes (more than ten minutes of a full schedule); beyond it the oldest are lost."""
 
@@ -42,11 +45,36 @@ class JoinedEpoch(Generic[T]):
     timed_out: tuple[str, ...] = ()
 
 
+class LateEpochs:
+    """Tells a stream that goes on in the past from one that merely comes late.
+
+    One epoch with a time far ahead would otherwise make everything after it late for ever.
+    """
+
+    def __init__(self) -> None:
+        self._count = 0
+        self._last = 0
+
+    def in_time(self) -> None:
+        """Something was in time: the time is right."""
+        self._count = 0
+
+    def restarts(self, key: int) -> bool:
+        """Note a late epoch; whether time begins anew with it."""
+        if self._count == 0 or key < self._last:
+            self._count = 1
+        elif key > self._last:
+            self._count += 1
+        self._last = key
+        return self._count >= RESTART_AFTER_LATE
+
+
 class EpochJoiner(Generic[T]):
     """Collects one item a source and epoch and gives out epochs in order.
 
     An epoch is complete when every source has delivered it or a later one (each stream is in order). It is given up
-    `timeout_s` after its first item arrived. An item for an epoch already given out is late: dropped and counted.
+    `timeout_s` after its first item arrived. An item for an epoch already given out is late: dropped and counted. When
+    nothing comes but late epochs, one after the other, the joiner begins anew with them.
 
     Parameters
     ----------
@@ -63,6 +91,7 @@ class EpochJoiner(Generic[T]):
         self._watermark: dict[str, int | None] = dict.fromkeys(sources)
         self._timeout_s = timeout_s
         self._pending: dict[int, tuple[float, dict[str, T]]] = {}
+        self._late = LateEpochs()
         self.last_key: int | None = None
         self.late = dict.fromkeys(sources, 0)
         self.duplicate = dict.fromkeys(sources, 0)
@@ -72,7 +101,10 @@ class EpochJoiner(Generic[T]):
         """Deliver an item; returns the epochs it completes, in order. `now_s` is a monotonic time."""
         if self.last_key is not None and key <= self.last_key:
             self.late[source] += 1
-            return []
+            if not self._late.restarts(key):
+                return []
+            self._begin_anew()
+        self._late.in_time()
         _, items = self._pending.setdefault(key, (now_s, {}))
         if source in items:
             self.duplicate[source] += 1
@@ -82,6 +114,11 @@ class EpochJoiner(Generic[T]):
         self._watermark[source] = key if mark is None else max(mark, key)
         marks = [m for m in self._watermark.values() if m is not None]
         return self._release_through(min(marks)) if len(marks) == len(self._watermark) else []
+
+    def _begin_anew(self) -> None:
+        self._pending.clear()
+        self._watermark = dict.fromkeys(self._watermark)
+        self.last_key = None
 
     def expire(self, now_s: float) -> list[JoinedEpoch[T]]:
         """Give up waiting where the deadline has passed; returns those epochs, and any before them, in order."""
@@ -217,6 +254,13 @@ class BurstQueue:
             del self._waiting[0]
             self.overflow += 1
 
+    def begin_anew(self, key: int) -> None:
+        """Forget frames that the observation at `key` may not see: their time was wrong."""
+        limit = self.limit(key)
+        self._waiting = [entry for entry in self._waiting if entry[0] <= limit]
+        self._seen = {frame: slots for frame, slots in self._seen.items() if frame <= limit}
+        self.passed = max(self._seen) - 1 if self._seen else None  # the last may not be whole yet
+
     def complete(self, key: int) -> bool:
         """Whether every frame the observation at `key` may see is over: seen whole, or followed by a later one."""
         return self.passed is not None and self.passed >= self.limit(key)
@@ -249,6 +293,7 @@ class AirborneJoiner(Generic[T]):
         self._bursts = BurstQueue(correction_wait_s)
         self._timeout_s = timeout_s
         self._pending: list[tuple[int, float, T]] = []
+        self._late = LateEpochs()
         self.last_key: int | None = None
         self.late = 0
         self.duplicate = 0
@@ -276,7 +321,12 @@ class AirborneJoiner(Generic[T]):
         """Deliver an observation; returns what can be processed, in order."""
         if self.last_key is not None and key <= self.last_key:
             self.late += 1
-        elif any(key == pending for pending, _, _ in self._pending):
+            if not self._late.restarts(key):
+                return []
+            self._pending, self.last_key = [], None
+            self._bursts.begin_anew(key)
+        self._late.in_time()
+        if any(key == pending for pending, _, _ in self._pending):
             self.duplicate += 1
         else:
             insort(self._pending, (key, now_s, item), key=lambda entry: entry[0])
