@@ -6,7 +6,7 @@ replay of its bag.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 from gbas_airborne.params import AirborneParams
@@ -22,6 +22,10 @@ from gbas_msgs_py.events import Event
 from gbas_msgs_py.joining import AirborneInput, AirborneJoiner, ReceptionQueue
 from gbas_msgs_py.records import IntegrityEpoch, ProtectionEpoch, SolutionEpoch
 from gbas_msgs_py.vdb.burst import Burst
+
+
+Channel = Callable[[int, tuple[Burst, ...]], Iterable[Burst]]
+"""What the VDB makes of the bursts sent at an epoch (its key): the bursts that arrive then, in that order."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,15 +75,20 @@ class Chain:
             correction_wait_s=airborne.correction_wait_s, timeout_s=1.0
         )
 
-    def run(self, epochs: Iterable[RecordedEpoch]) -> Iterator[GroundOutput | AirborneOutput]:
-        """Step both ends through the epochs, in order; outputs come in the order in which they are made."""
+    def run(
+        self, epochs: Iterable[RecordedEpoch], *, channel: Channel | None = None
+    ) -> Iterator[GroundOutput | AirborneOutput]:
+        """Step both ends through the epochs, in order; outputs come in the order in which they are made.
+
+        Without a `channel` every burst arrives as it was sent.
+        """
         for epoch in epochs:
             ready: list[AirborneInput[ObservationEpoch]] = []
             if epoch.user is not None:
                 ready += self._joiner.add_observation(epoch.key, epoch.user, 0.0)
             station = self.ground_step(epoch)
             yield station
-            for burst in station.bursts:
+            for burst in station.bursts if channel is None else channel(epoch.key, station.bursts):
                 ready += self._joiner.add_burst(burst)
             for item in ready:
                 yield self.airborne_step(item)
