@@ -23,7 +23,6 @@ from gbas_msgs_py.joining import AirborneInput, AirborneJoiner, ReceptionQueue
 from gbas_msgs_py.records import IntegrityEpoch, ProtectionEpoch, SolutionEpoch
 from gbas_msgs_py.vdb.burst import Burst
 
-
 Channel = Callable[[int, tuple[Burst, ...]], Iterable[Burst]]
 """What the VDB makes of the bursts sent at an epoch (its key): the bursts that arrive then, in that order."""
 
