@@ -37,7 +37,8 @@ from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float64, Float64MultiArray, String, UInt8, UInt8MultiArray
 
 from gbas_core.record import Record
-from gbas_msgs_py import ros, topics
+from gbas_msgs_py import cdr, ros, topics
+from gbas_msgs_py.cdr import TableCodec
 from gbas_msgs_py.events import Event
 from gbas_msgs_py.parameters import ParameterError, field_types, parameters_from, require, unknown_parameters
 from gbas_msgs_py.qos import qos_of
@@ -57,6 +58,7 @@ STATUS_WARN: Final = DiagnosticStatus.WARN
 STATUS_ERROR: Final = DiagnosticStatus.ERROR
 STATUS_STALE: Final = DiagnosticStatus.STALE
 REPORT_PERIOD_S: Final = 1.0
+_PROGRESS: Final = TableCodec(PROGRESS)
 _POLL_S: Final = 0.1
 _GATE_POLL_S: Final = 0.01
 _GRACE_S: Final = 0.005
@@ -94,7 +96,7 @@ class TablePublisher(Generic[R]):
 
     def __init__(self, publisher: Publisher, schema: TableSchema[R]) -> None:
         self._publisher = publisher
-        self._schema = schema
+        self._codec = TableCodec(schema)
 
     def settled(self, timeout_s: float) -> bool:
         """Wait until all readers have what was sent; False when that takes longer than the time-out."""
@@ -102,7 +104,7 @@ class TablePublisher(Generic[R]):
 
     def publish(self, record: R) -> None:
         """Encode and send a record."""
-        self._publisher.publish(ros.table_to_msg(self._schema, record))
+        self._publisher.publish(self._codec.encode(record))
 
 
 class GbasNode(Node):
@@ -180,7 +182,7 @@ class GbasNode(Node):
     def burst_publisher(self, topic: str, *, readers: int = 0) -> Callable[[Burst], None]:
         """Function that sends a burst."""
         publisher = self._gated_publisher(UInt8MultiArray, topic, readers)
-        return lambda burst: publisher.publish(ros.burst_to_msg(burst))
+        return lambda burst: publisher.publish(cdr.encode_burst(burst))
 
     def message_publisher(self, message_type: type, topic: str) -> Publisher:
         """Publisher of a standard message."""
@@ -192,7 +194,7 @@ class GbasNode(Node):
 
         def publish(value: float) -> None:
             if publisher.get_subscription_count():
-                publisher.publish(Float64(data=value))
+                publisher.publish(cdr.encode_float(value))
 
         return publish
 
@@ -202,7 +204,7 @@ class GbasNode(Node):
 
         def publish(value: int) -> None:
             if publisher.get_subscription_count():
-                publisher.publish(UInt8(data=value))
+                publisher.publish(cdr.encode_uint8(value))
 
         return publish
 
@@ -212,7 +214,7 @@ class GbasNode(Node):
 
         def publish(gps_week: int, tow_s: float) -> None:
             if publisher.get_subscription_count():
-                publisher.publish(Clock(clock=ros.stamp_of(gps_week, tow_s)))
+                publisher.publish(cdr.encode_clock(gps_week, tow_s))
 
         return publish
 
@@ -234,7 +236,7 @@ class GbasNode(Node):
     def _publish_progress(self) -> None:
         if self.last_epoch is not None and self._progress.get_subscription_count():
             record = ProgressEpoch(gps_week=self.last_epoch[0], tow_s=self.last_epoch[1])
-            self._progress.publish(ros.table_to_msg(PROGRESS, record))
+            self._progress.publish(_PROGRESS.encode(record))
 
     def _publisher(self, message_type: type, topic: str) -> Publisher:
         options = QoSOverridingOptions.with_default_policies()
@@ -252,9 +254,8 @@ class GbasNode(Node):
         self, topic: str, schema: TableSchema[R], callback: Callable[[R], None], *, quiet: bool = False
     ) -> None:
         """Call back with each record; with `quiet` they do not count as input whose absence is reported."""
-        self._subscription(
-            Float64MultiArray, topic, lambda message: ros.table_from_msg(message, schema), callback, quiet
-        )
+        codec = TableCodec(schema)
+        self._subscription(Float64MultiArray, topic, lambda data: ros.table_from_bytes(data, codec), callback, quiet)
 
     def progress_subscription(self, reader: str, callback: Callable[[ProgressEpoch], None]) -> None:
         """Call back when a reader, named by its node or its topic, has finished with an epoch."""
@@ -266,20 +267,20 @@ class GbasNode(Node):
 
     def burst_subscription(self, topic: str, callback: Callable[[Burst], None]) -> None:
         """Call back with each burst."""
-        self._subscription(UInt8MultiArray, topic, ros.burst_from_msg, callback, quiet=False)
+        self._subscription(UInt8MultiArray, topic, ros.burst_from_bytes, callback, quiet=False)
 
     def _subscription(
         self,
         message_type: type,
         topic: str,
-        decode: Callable[[Any], Any],
+        decode: Callable[[bytes], Any],
         callback: Callable[[Any], None],
         quiet: bool,
     ) -> None:
-        def receive(message: Any) -> None:
+        def receive(data: bytes) -> None:
             self.activity += 1
             try:
-                item = decode(message)
+                item = decode(data)
             except SchemaError as error:
                 self.problem(f"bad message on {topic}", str(error))
                 return
@@ -290,7 +291,7 @@ class GbasNode(Node):
 
         options = QoSOverridingOptions.with_default_policies()
         profile = ros.qos_profile(qos_of(topic))
-        self.create_subscription(message_type, topic, receive, profile, qos_overriding_options=options)
+        self.create_subscription(message_type, topic, receive, profile, qos_overriding_options=options, raw=True)
 
     def problem(self, kind: str, detail: str = "") -> None:
         """Count something that went wrong without ending the node; diagnostics and the log show it."""

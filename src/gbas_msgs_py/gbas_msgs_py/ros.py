@@ -9,19 +9,30 @@ from __future__ import annotations
 import array
 import math
 from collections.abc import Mapping
-from typing import Any, Final, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import NavSatFix, NavSatStatus
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout, String, UInt8MultiArray
 
 from gbas_core.frames import geodetic_from_ecef
-from gbas_core.gpstime import MILLISECONDS_PER_WEEK, epoch_key
+from gbas_core.gpstime import MILLISECONDS_PER_WEEK
 from gbas_core.record import Record
 from gbas_core.satellites import IS_GALILEO, IS_GPS
+from gbas_msgs_py.cdr import (
+    BURST_DIMENSIONS,
+    BURST_LABEL,
+    MAX_BURST_BYTES,
+    ROWS_LABEL,
+    TableCodec,
+    burst_numbers,
+    decode_burst,
+    stamp,
+)
 from gbas_msgs_py.events import Event
 from gbas_msgs_py.qos import Qos
 from gbas_msgs_py.records import SolutionEpoch
@@ -31,19 +42,11 @@ from gbas_msgs_py.vdb.burst import SLOT_NAMES, Burst
 
 R = TypeVar("R", bound=Record)
 
-ROWS_LABEL: Final = "rows"
-BURST_LABEL: Final = "gbas/vdb_burst/1"
-BURST_DIMENSIONS: Final = ("gps_week", "tow_ms", "slot", "bursts_in_frame", "bytes")
-MAX_BURST_BYTES: Final = 228
-"""222 bytes of application data and 6 of FEC (RTCA DO-246E 2.2.2)."""
-GPS_EPOCH_UNIX_S: Final = 315_964_800
-"""1980-01-06 as Unix time."""
-
 
 def stamp_of(gps_week: int, tow_s: float) -> Time:
     """ROS time of an epoch: GPS time counted from the Unix epoch, without leap seconds (so it never jumps)."""
-    milliseconds = epoch_key(gps_week, tow_s) + GPS_EPOCH_UNIX_S * 1000
-    return Time(sec=milliseconds // 1000, nanosec=milliseconds % 1000 * 1_000_000)
+    seconds, nanoseconds = stamp(gps_week, tow_s)
+    return Time(sec=seconds, nanosec=nanoseconds)
 
 
 def qos_profile(qos: Qos) -> QoSProfile:
@@ -101,10 +104,8 @@ def table_from_msg(message: Float64MultiArray, schema: TableSchema[R] | None = N
 
 def burst_to_msg(burst: Burst) -> UInt8MultiArray:
     """Message of a burst; the numbers are the sizes of labelled dimensions, the bytes are the data."""
-    tow_ms = round(burst.tow_s * 1000.0)
-    numbers = (burst.gps_week, tow_ms, burst.slot, burst.bursts_in_frame, len(burst.payload))
     dims = [MultiArrayDimension(label=BURST_LABEL)]
-    dims += [MultiArrayDimension(label=k, size=v) for k, v in zip(BURST_DIMENSIONS, numbers, strict=True)]
+    dims += [MultiArrayDimension(label=k, size=v) for k, v in zip(BURST_DIMENSIONS, burst_numbers(burst), strict=True)]
     message = UInt8MultiArray(layout=MultiArrayLayout(dim=dims))
     message.data = array.array("B", burst.payload)
     return message
@@ -144,6 +145,25 @@ def burst_from_msg(message: UInt8MultiArray) -> Burst:
     if in_frame == 0 and size:
         raise SchemaError(f"{BURST_LABEL}: {size} bytes in a frame of 0 bursts, expected none")
     return Burst(gps_week=week, tow_s=tow_ms / 1000.0, slot=slot, bursts_in_frame=in_frame, payload=payload)
+
+
+def table_from_bytes(data: bytes, codec: TableCodec[R]) -> R:
+    """Record of a serialised message; raises SchemaError as :func:`table_from_msg` does."""
+    record = codec.decode(data)
+    return table_from_msg(_deserialised(data, Float64MultiArray), codec.schema) if record is None else record
+
+
+def burst_from_bytes(data: bytes) -> Burst:
+    """Burst of a serialised message; raises SchemaError as :func:`burst_from_msg` does."""
+    burst = decode_burst(data)
+    return burst_from_msg(_deserialised(data, UInt8MultiArray)) if burst is None else burst
+
+
+def _deserialised(data: bytes, message_type: type) -> Any:
+    try:
+        return deserialize_message(data, message_type)
+    except Exception as error:
+        raise SchemaError(f"{len(data)} bytes that are no {message_type.__name__}: {error}") from None
 
 
 def event_to_msg(event: Event) -> String:
