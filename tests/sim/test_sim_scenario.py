@@ -106,7 +106,7 @@ def test_dotted_keys_and_files_say_the_same(tmp_path):
 @pytest.mark.parametrize(
     ("sim", "message"),
     [
-        ({"sead": 1}, r"sim\.sead is unknown; known are interval_s, seed"),
+        ({"sead": 1}, r"sim\.sead is unknown; known are .*interval_s, seed"),
         ({"seed": 1.5}, r"sim\.seed = 1\.5 is not a int"),
         ({"seed": True}, r"sim\.seed = True is not a int"),
         ({"flight": {"sped": 1.0}}, r"sim\.flight\.sped is unknown"),
@@ -116,7 +116,7 @@ def test_dotted_keys_and_files_say_the_same(tmp_path):
             {"ground_receiver": {"noise_scale": -1.0}},
             r"sim\.ground_receiver: receiver: noise_scale = -1\.0 is not within",
         ),
-        ({"airborne_receiver": {"spacing_chips": [0.1]}}, r"sim\.airborne_receiver: .* is not two numbers"),
+        ({"airborne_receiver": {"spacing_chips": [0.1]}}, r"sim\.airborne_receiver\.spacing_chips = \[0\.1\] has not 2 values"),
         ({"airborne_receiver": {"elevation_mask_rad": 0.1}}, r"elevation_mask_rad is unknown"),
         ({"troposphere": {"humidity": 1.0}}, r"sim\.troposphere\.humidity is unknown"),
         ({"troposphere": {"refractivity": -1.0}}, r"troposphere: refractivity = -1\.0 is not within"),

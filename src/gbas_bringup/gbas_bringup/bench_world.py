@@ -19,9 +19,10 @@ from gbas_core.frames import geodetic_from_ecef, rot_enu_ecef
 from gbas_core.orbits import satellite_state
 from gbas_core.record import FloatArray
 from gbas_core.satellites import N_GPS, N_SATS
+from gbas_sim.broadcast import Orbits
 from gbas_sim.scenario import scenario_from_yaml
 from gbas_sim.sightlines import elevations_rad
-from gbas_sim.world import World, WorldParams
+from gbas_sim.world import World, WorldParams, open_orbits
 
 CONFIG: Final = "bench.yaml"
 SATELLITES_A_SYSTEM: Final = 15
@@ -36,8 +37,8 @@ class CrowdedWorld(World):
     """A world in which :data:`SATELLITES_A_SYSTEM` GPS and as many Galileo satellites are seen at every epoch."""
 
     def __init__(self, params: WorldParams) -> None:
-        super().__init__(params)
-        self.ephemeris = crowded(self.ephemeris, params)
+        ephemeris = crowded(open_orbits(params).received[0], params)
+        super().__init__(params, orbits=Orbits(truth=(ephemeris,), switch_s=(), received=(ephemeris,)))
 
 
 def bench_config() -> Path:

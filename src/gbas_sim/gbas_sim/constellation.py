@@ -14,6 +14,7 @@ and 20-III; Galileo OS SIS ICD 2.1, 5.1.1, 5.1.3 and 5.1.5.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -88,6 +89,7 @@ _CLOCK_SCALES: Final[dict[str, tuple[float, float]]] = {
     "group_delay_s": (2.0**-31, 2.0**-32),
     "group_delay_e5b_s": (math.nan, 2.0**-32),
 }
+_ANGLES: Final = ("m0_rad", "omega0_rad", "omega_rad")
 _ZERO_FIELDS: Final = ("idot_radps", "cuc_rad", "cus_rad", "crc_m", "crs_m", "cic_rad", "cis_rad", "af2_sps2")
 
 
@@ -205,12 +207,11 @@ def nominal_ephemeris(gps_week: int, tow_s: float, *, seed: int, systems: NDArra
     Ephemeris
         Received an hour before the start, healthy, every field a multiple of its scale factor.
     """
-    toe_s = round(tow_s / _TOE_GRID_S) * _TOE_GRID_S
-    toe_week, toe_tow_s = add_seconds(gps_week, 0.0, toe_s)
+    toe_week, toe_tow_s = time_of_ephemeris(gps_week, tow_s)
     slots = nominal_slots(toe_week, toe_tow_s)
     present = np.isfinite(slots.semi_major_m) & systems
     fields = _orbit_fields(slots, toe_tow_s) | _clock_fields(seed)
-    issue = float(int(toe_s // _TOE_GRID_S) % 200)
+    issue = issue_of(toe_tow_s)
     fields |= {
         "message": np.where(IS_GPS, float(NavigationMessage.GPS_LNAV), float(NavigationMessage.GALILEO_INAV)),
         "iod": np.full(N_SATS, issue),
@@ -225,6 +226,30 @@ def nominal_ephemeris(gps_week: int, tow_s: float, *, seed: int, systems: NDArra
     week, tow = add_seconds(gps_week, tow_s, -RECEIVED_BEFORE_S)
     received = {name: np.where(present, values, np.nan) for name, values in fields.items()}
     return Ephemeris(gps_week=week, tow_s=tow, simulated=1.0, **received)
+
+
+def time_of_ephemeris(gps_week: int, tow_s: float) -> tuple[int, float]:
+    """The time nearest to a given one that both messages can express: week and time of week [s]."""
+    return add_seconds(gps_week, 0.0, round(tow_s / _TOE_GRID_S) * _TOE_GRID_S)
+
+
+def issue_of(toe_tow_s: float) -> float:
+    """Issue of data of an ephemeris; another for each within 13 hours."""
+    return float(int(toe_tow_s // _TOE_GRID_S) % 200)
+
+
+def group_delays_s(seed: int) -> dict[str, FloatArray]:
+    """Group delays of all satellites, ``(N_SATS,)`` by field of the ephemeris [s]."""
+    drawn = _clock_fields(seed)
+    return {name: drawn[name] for name in ("group_delay_s", "group_delay_e5b_s")}
+
+
+def quantised_fields(exact: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """Fields of orbits and clocks as multiples of their scale factors, angles within half a turn of zero."""
+    turned = {name: _half_turns(exact[name]) if name in _ANGLES else exact[name] for name in _ORBIT_SCALES}
+    orbit = {name: _quantised(values, _ORBIT_SCALES[name]) for name, values in turned.items()}
+    clock = {name: _quantised(exact[name], np.where(IS_GPS, *scales)) for name, scales in _CLOCK_SCALES.items()}
+    return orbit | clock
 
 
 def _quantised(values: FloatArray, scale: FloatArray | float) -> FloatArray:

@@ -1,4 +1,7 @@
-"""Receivers: what one makes of the signals that reach it, with its clock and its thermal noise.
+"""Receivers: what one makes of the signals that reach it, with its clock and its errors.
+
+A kind of receiver is either a :class:`~gbas_sim.receiver_model.ReceiverModel` (loops, multipath, hardware), of which
+there are presets, or a :class:`ReceiverParams`, the simple kind described here.
 
 Code, carrier and Doppler noise follow from C/N0 by the usual formulas for tracking loops, C/N0 from elevation. Noise is
 white from epoch to epoch. Every draw is a function of (seed, receiver, epoch): random numbers come from a counter based
@@ -12,7 +15,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +23,11 @@ from numpy.typing import NDArray
 from gbas_core.observations import ObservationEpoch
 from gbas_core.record import FloatArray
 from gbas_core.satellites import IS_GPS, N_SATS
-from gbas_core.signals import L1, L5, N_BANDS, SPEED_OF_LIGHT_MPS, WAVELENGTH_M
+from gbas_core.signals import IONO_RATIO, L1, L5, N_BANDS, SPEED_OF_LIGHT_MPS, WAVELENGTH_M
+from gbas_sim.oscillators import ClockState
+from gbas_sim.paths import Delay
+from gbas_sim.random_processes import Normals
+from gbas_sim.receiver_model import ReceiverErrors, ReceiverModel, SignalErrors, rinex_rounded
 from gbas_sim.sightlines import Sightlines
 
 _CA_CHIP_M: Final = SPEED_OF_LIGHT_MPS / 1.023e6
@@ -33,6 +40,9 @@ PEAK_SLOPE: Final[FloatArray] = np.where(np.arange(N_BANDS)[:, np.newaxis] == L1
 
 _LARGEST_AMBIGUITY: Final = 1_000_000
 _QUANTITIES: Final = 3  # code, carrier, Doppler
+_RATIO: Final = IONO_RATIO[:, np.newaxis]
+WEAKEST_DBHZ: Final = 20.0
+"""C/N0 below which a receiver of :class:`ReceiverParams` tracks nothing. Ours."""
 
 
 class Stream(IntEnum):
@@ -132,60 +142,106 @@ def noise_sigmas(params: ReceiverParams, cn0: FloatArray) -> tuple[FloatArray, F
     return scale * CHIP_M * chips, scale * WAVELENGTH_M[:, np.newaxis] * cycles, scale * hertz
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class ReceiverBank:
-    """Receivers of one kind, with what each keeps for the whole run.
+class WhiteErrors:
+    """Errors of receivers of one kind of :class:`ReceiverParams`; as :class:`~gbas_sim.receiver_model.ReceiverErrors`.
 
-    Attributes
+    Parameters
     ----------
     params : ReceiverParams
     seed : int
     numbers : tuple of int
         Which receivers they are: another number, other noise.
-    clock_offset_s, clock_drift : (R,) arrays
-        Clock less system time at the start [s] and its rate.
+    interval_s : float
+        Between epochs [s].
+    """
+
+    def __init__(self, params: ReceiverParams, *, seed: int, numbers: tuple[int, ...], interval_s: float) -> None:
+        self._params, self._numbers, self._interval_s = params, numbers, interval_s
+        self._normals = Normals(seed, Stream.NOISE)
+        drawn = np.array([_generator(seed, Stream.CLOCK, number).uniform(-1.0, 1.0, 2) for number in numbers])
+        self._offset_s, self._drift = params.clock_offset_s * drawn[:, 0], params.clock_drift * drawn[:, 1]
+
+    def clocks(self, epoch: int) -> ClockState:
+        """Clocks less system time and their rates, (R,) each."""
+        return ClockState(self._offset_s + self._drift * (self._interval_s * epoch), self._drift)
+
+    def cn0_dbhz(self, elevation_rad: FloatArray, *, change_db: FloatArray | float = 0.0) -> FloatArray:
+        """C/N0 ``(R, N_BANDS, N_SATS)`` [dB-Hz]; NaN on L2."""
+        return np.asarray(cn0_dbhz(self._params, elevation_rad) + change_db)
+
+    def tracked(self, elevation_rad: FloatArray, cn0: FloatArray) -> NDArray[np.bool_]:
+        """Signals ``(R, N_BANDS, N_SATS)`` above the mask and the weakest C/N0 that is tracked."""
+        above = (elevation_rad >= self._params.elevation_mask_rad)[:, np.newaxis, :]
+        return np.asarray(above & (cn0 >= WEAKEST_DBHZ))
+
+    def at(self, epoch: int, elevation_rad: FloatArray, cn0: FloatArray) -> SignalErrors:
+        """Errors of an epoch; noise is drawn for every place, tracked or not."""
+        noise = np.full((len(self._numbers), _QUANTITIES, N_BANDS, N_SATS), np.nan)
+        noise[:, :, (L1, L5)] = self._normals.rows(self._numbers, epoch, (_QUANTITIES, 2, N_SATS))
+        sigmas = noise_sigmas(self._params, cn0)
+        code, carrier, doppler = (sigma * noise[:, place] for place, sigma in enumerate(sigmas))
+        return SignalErrors(code_m=code, carrier_m=carrier, doppler_hz=doppler, cn0_dbhz=cn0)
+
+
+class Arrivals(NamedTuple):
+    """Signals as they arrive at receivers of one kind, and what is held of them.
+
+    Attributes
+    ----------
+    lines : Sightlines
+        Geometry with all that delays codes and carriers alike, (R, N_SATS).
+    dispersive : Delay
+        Delay of the code on L1 that is opposite on the carrier and goes with the square of the wavelength.
+    code_m, carrier_m, rate_mps : (R, N_BANDS, N_SATS) arrays or 0
+        Added by faults: to codes and carriers, and the rate of the carrier's [m], [m/s].
+    cn0_dbhz, elevation_rad : (R, N_BANDS, N_SATS) and (R, N_SATS) arrays
+    tracked, tracked_before : (R, N_BANDS, N_SATS) bool arrays
+        In this epoch and in the one before.
+    """
+
+    lines: Sightlines
+    dispersive: Delay
+    code_m: FloatArray | float
+    carrier_m: FloatArray | float
+    rate_mps: FloatArray | float
+    cn0_dbhz: FloatArray
+    elevation_rad: FloatArray
+    tracked: NDArray[np.bool_]
+    tracked_before: NDArray[np.bool_]
+
+
+class ReceiverBank:
+    """Receivers of one kind.
+
+    Parameters
+    ----------
+    kind : ReceiverParams or ReceiverModel
+    seed : int
+    numbers : tuple of int
+        Which receivers they are.
+    interval_s : float
+        Between epochs [s].
+
+    Attributes
+    ----------
+    numbers : tuple of int
+    errors : WhiteErrors or ReceiverErrors
     ambiguity_m : (R, N_BANDS, N_SATS) array
         Whole wavelengths in each carrier [m].
     """
 
-    params: ReceiverParams
-    seed: int
-    numbers: tuple[int, ...]
-    clock_offset_s: FloatArray
-    clock_drift: FloatArray
-    ambiguity_m: FloatArray
-
-    @classmethod
-    def make(cls, params: ReceiverParams, seed: int, numbers: tuple[int, ...]) -> ReceiverBank:
-        """Draw clocks and ambiguities."""
-        clocks = np.array([_generator(seed, Stream.CLOCK, number).uniform(-1.0, 1.0, 2) for number in numbers])
+    def __init__(
+        self, kind: ReceiverParams | ReceiverModel, *, seed: int, numbers: tuple[int, ...], interval_s: float
+    ) -> None:
+        self.kind, self.numbers = kind, numbers
+        model = ReceiverErrors if isinstance(kind, ReceiverModel) else WhiteErrors
+        self.errors = model(kind, seed=seed, numbers=numbers, interval_s=interval_s)  # type: ignore[arg-type]
         shape, largest = (N_BANDS, N_SATS), _LARGEST_AMBIGUITY
         cycles = [_generator(seed, Stream.AMBIGUITY, number).integers(-largest, largest, shape) for number in numbers]
-        return cls(
-            params=params,
-            seed=seed,
-            numbers=numbers,
-            clock_offset_s=params.clock_offset_s * clocks[:, 0],
-            clock_drift=params.clock_drift * clocks[:, 1],
-            ambiguity_m=np.array(cycles) * WAVELENGTH_M[:, np.newaxis],
-        )
-
-    def clock_s(self, since_start_s: FloatArray) -> FloatArray:
-        """Clocks less system time ``(..., R)`` at times ``(...)`` since the start [s]."""
-        return self.clock_offset_s + self.clock_drift * since_start_s[..., np.newaxis]
+        self.ambiguity_m = np.array(cycles) * WAVELENGTH_M[:, np.newaxis]
 
     def observe(
-        self,
-        *,
-        gps_week: int,
-        tow_s: float,
-        epoch: int,
-        clock_s: FloatArray,
-        lines: Sightlines,
-        group_delay_s: FloatArray,
-        elevation_rad: FloatArray,
-        tracked: NDArray[np.bool_],
-        tracked_before: NDArray[np.bool_],
+        self, *, gps_week: int, tow_s: float, epoch: int, clock: ClockState, group_delay_s: FloatArray, seen: Arrivals
     ) -> tuple[ObservationEpoch, ...]:
         """Observations of one epoch, one record a receiver.
 
@@ -193,51 +249,40 @@ class ReceiverBank:
         ----------
         epoch : int
             Number of the epoch, which its noise depends on.
-        clock_s : (R,) array
-            The receivers' clocks less system time [s].
-        lines : Sightlines
-            Geometry (R, N_SATS).
+        clock : ClockState
+            The receivers' clocks less system time (R,).
         group_delay_s : (N_BANDS, N_SATS) array
             Of the satellites; NaN where a band is not transmitted [s].
-        elevation_rad : (R, N_SATS) array
-        tracked, tracked_before : (R, N_SATS) bool arrays
-            Satellites tracked in this epoch and in the one before.
         """
-        cn0 = np.where(tracked[:, np.newaxis, :], cn0_dbhz(self.params, elevation_rad), np.nan)
-        noise = self._noise(epoch)
-        code_sigma, carrier_sigma, doppler_sigma = noise_sigmas(self.params, cn0)
-        clock_m = SPEED_OF_LIGHT_MPS * (clock_s[:, np.newaxis] - lines.clock_s)
+        lines = seen.lines
+        errors = self.errors.at(epoch, seen.elevation_rad, seen.cn0_dbhz)
+        clock_m = SPEED_OF_LIGHT_MPS * (clock.offset_s[:, np.newaxis] - lines.clock_s)
         pseudorange = (lines.range_m + clock_m)[:, np.newaxis, :] + SPEED_OF_LIGHT_MPS * group_delay_s
-        own_drift = self.clock_drift[:, np.newaxis]
-        rate = (lines.range_rate_mps - SPEED_OF_LIGHT_MPS * lines.clock_drift) * (1.0 - own_drift)
-        doppler = -(rate + SPEED_OF_LIGHT_MPS * own_drift)[:, np.newaxis, :] / WAVELENGTH_M[:, np.newaxis]
-        code = pseudorange + code_sigma * noise[:, 0]
-        carrier = pseudorange + self.ambiguity_m + carrier_sigma * noise[:, 1]
-        doppler = doppler + doppler_sigma * noise[:, 2]
-        lli = np.where(np.isnan(code), np.nan, np.where(tracked_before, 0.0, 1.0)[:, np.newaxis, :])
-        return tuple(
+        delay = _RATIO * seen.dispersive.delay_m[:, np.newaxis, :]
+        advancing = seen.rate_mps - _RATIO * seen.dispersive.rate_mps[:, np.newaxis, :]
+        drift = clock.drift[:, np.newaxis, np.newaxis]
+        signal = (lines.range_rate_mps - SPEED_OF_LIGHT_MPS * lines.clock_drift)[:, np.newaxis, :] + advancing
+        rate = signal * (1.0 - drift) + SPEED_OF_LIGHT_MPS * drift
+        tracked = seen.tracked & np.isfinite(pseudorange)
+        values = {
+            "code_m": pseudorange + delay + seen.code_m + errors.code_m,
+            "carrier_m": pseudorange - delay + seen.carrier_m + self.ambiguity_m + errors.carrier_m,
+            "doppler_hz": -rate / WAVELENGTH_M[:, np.newaxis] + errors.doppler_hz,
+            "cn0_dbhz": errors.cn0_dbhz,
+            "lli": np.where(seen.tracked_before, 0.0, 1.0),
+        }
+        held = {name: np.where(tracked, each, np.nan) for name, each in values.items()}
+        observations = tuple(
             ObservationEpoch(
-                gps_week=gps_week,
-                tow_s=tow_s,
-                simulated=1.0,
-                code_m=code[row],
-                carrier_m=carrier[row],
-                doppler_hz=doppler[row],
-                cn0_dbhz=cn0[row],
-                lli=lli[row],
+                gps_week=gps_week, tow_s=tow_s, simulated=1.0, **{name: each[row] for name, each in held.items()}
             )
             for row in range(len(self.numbers))
         )
-
-    def _noise(self, epoch: int) -> FloatArray:
-        """Standard normal numbers ``(R, 3, N_BANDS, N_SATS)``, drawn for every place whether tracked or not."""
-        shape = (_QUANTITIES, 2, N_SATS)
-        noise = np.full((len(self.numbers), _QUANTITIES, N_BANDS, N_SATS), np.nan)
-        for row, number in enumerate(self.numbers):
-            noise[row][:, (L1, L5)] = _generator(self.seed, Stream.NOISE, number, epoch).standard_normal(shape)
-        return noise
+        if isinstance(self.kind, ReceiverModel) and self.kind.rinex_steps:
+            return tuple(rinex_rounded(each) for each in observations)
+        return observations
 
 
-def _generator(seed: int, stream: Stream, number: int, epoch: int = 0) -> np.random.Generator:
-    """Random numbers of one receiver, purpose and epoch: the two low words of the counter are left to count with."""
-    return np.random.Generator(np.random.Philox(key=[seed, int(stream)], counter=[0, 0, epoch, number]))
+def _generator(seed: int, stream: Stream, number: int) -> np.random.Generator:
+    """Random numbers of one receiver and purpose, drawn once."""
+    return np.random.Generator(np.random.Philox(key=[seed, int(stream)], counter=[0, 0, 0, number]))

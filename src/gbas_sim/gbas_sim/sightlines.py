@@ -7,11 +7,11 @@ from typing import Final
 
 import numpy as np
 
-from gbas_core.ephemeris import Ephemeris
 from gbas_core.frames import EARTH_RATE_RADPS, geodetic_from_ecef, los_and_range
-from gbas_core.orbits import SatelliteState, rotated_range, satellite_state
+from gbas_core.orbits import SatelliteState, rotated_range
 from gbas_core.record import FloatArray
 from gbas_core.signals import SPEED_OF_LIGHT_MPS
+from gbas_sim.broadcast import Arc
 
 _MEAN_FLIGHT_S: Final = 0.077
 
@@ -44,27 +44,28 @@ class Sightlines:
         return replace(self, range_m=self.range_m + delay_m, range_rate_mps=self.range_rate_mps + rate_mps)
 
 
-def sky(ephemeris: Ephemeris, gps_week: int, tow_s: FloatArray) -> SatelliteState:
+def sky(arc: Arc, tow_s: FloatArray) -> SatelliteState:
     """Satellites as seen at times ``(...)``, all with one mean flight time; arrays (..., 3, N_SATS) and (..., N_SATS).
 
     Good for elevations (3 microradians) and as a first guess for :func:`sightlines`.
     """
-    return satellite_state(ephemeris, gps_week, np.asarray(tow_s)[..., np.newaxis] - _MEAN_FLIGHT_S, None)
+    return arc(np.asarray(tow_s)[..., np.newaxis] - _MEAN_FLIGHT_S)
 
 
 def sightlines(
-    ephemeris: Ephemeris,
-    gps_week: int,
+    arc: Arc,
     tow_s: float,
     early_s: FloatArray,
     seen: SatelliteState,
     position_m: FloatArray,
     velocity_mps: FloatArray,
 ) -> Sightlines:
-    """Geometry from broadcast orbits, through empty space.
+    """Geometry through empty space.
 
     Parameters
     ----------
+    arc : Arc
+        The satellites' orbits.
     tow_s : float
         Time tag [s].
     early_s : (R,) array
@@ -83,7 +84,7 @@ def sightlines(
     late_s = _MEAN_FLIGHT_S - range_m / SPEED_OF_LIGHT_MPS - early_s[:, np.newaxis]
     range_m, _ = rotated_range(position_m, seen.position_m + seen.velocity_mps * late_s[:, np.newaxis, :])
     transmitted_s = tow_s - (range_m / SPEED_OF_LIGHT_MPS + early_s[:, np.newaxis])
-    state = satellite_state(ephemeris, gps_week, transmitted_s, None)
+    state = arc(transmitted_s)
     range_m, los = rotated_range(position_m, state.position_m)
     rate = range_rate_mps(state, range_m, los, position_m, velocity_mps)
     slowed = 1.0 - rate / SPEED_OF_LIGHT_MPS

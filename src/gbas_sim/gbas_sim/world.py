@@ -1,4 +1,4 @@
-"""A simulated world: satellites, reference receivers and one aircraft, an epoch at a time.
+"""A simulated world: satellites, reference receivers and at most one aircraft, an epoch at a time.
 
 An epoch is a function of the parameters and its number: epochs can be made in any order, in any process, with the same
 bits.
@@ -9,28 +9,50 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
-from typing import Final
+from pathlib import Path
+from typing import Final, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from gbas_core.ephemeris import Ephemeris
 from gbas_core.gpstime import epoch_key, from_epoch_key
 from gbas_core.observations import ObservationEpoch
 from gbas_core.orbits import SatelliteState, group_delay_s
 from gbas_core.record import FloatArray
-from gbas_core.satellites import satellites_of
+from gbas_core.satellites import N_SATS, satellites_of
 from gbas_core.signals import L2, N_BANDS
-from gbas_sim.constellation import nominal_ephemeris
-from gbas_sim.flight import StraightIn
-from gbas_sim.receivers import AIRBORNE_RECEIVER, GROUND_RECEIVER, ReceiverBank, ReceiverParams
-from gbas_sim.sightlines import elevations_rad, sightlines, sky, verticals
-from gbas_sim.troposphere import Troposphere
+from gbas_sim.broadcast import Arc, Orbits, almanac_orbits, nominal_orbits, recorded_orbits
+from gbas_sim.fronts import PlasmaBubble, WedgeFront
+from gbas_sim.ionosphere import Ionosphere, IonosphereParams
+from gbas_sim.oscillators import ClockState
+from gbas_sim.paths import Delay, SignalPaths, Station
+from gbas_sim.receiver_model import ReceiverModel
+from gbas_sim.receivers import AIRBORNE_RECEIVER, GROUND_RECEIVER, Arrivals, ReceiverBank, ReceiverParams
+from gbas_sim.scintillation import Scintillation, ScintillationParams
+from gbas_sim.sightlines import sightlines, sky
+from gbas_sim.troposphere import Troposphere, WeatherBox
 
 MAX_RECEIVERS: Final = 4
-# The aircraft's noise does not depend on how many reference receivers there are.
-_AIRCRAFT_NUMBER: Final = 100
+AIRCRAFT_NUMBER: Final = 100
+"""Number of the aircraft's receiver: its noise does not depend on how many reference receivers there are."""
+LONGEST_S: Final = 7.0 * 86_400.0
 _EARTH_SURFACE_M: Final = (6.3e6, 6.5e6)
+_FARTHEST_M: Final = 20_000.0
+_INSTANTS_KEPT: Final = 3
+
+
+class FlightPath(Protocol):
+    """Where an aircraft is: :class:`gbas_sim.flight.StraightIn` or :class:`gbas_sim.flight_dynamics.Flight`."""
+
+    @property
+    def duration_s(self) -> float:
+        """From the start to the end [s]."""
+        ...
+
+    def state(self, since_start_s: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Position and velocity ``(..., 3)``, ECEF [m], [m/s], at times since the start ``(...)`` [s]."""
+        ...
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,11 +63,26 @@ class WorldParams:
     ----------
     receiver_ecef_m : tuple of (float, float, float)
         Antennas of 1 to 4 reference receivers, ECEF [m].
-    flight : StraightIn
+    flight : FlightPath or None
+        None is a station alone.
+    station_ecef_m : (float, float, float), optional
+        What distances of the atmosphere are measured from [m]; the first receiver unless given.
+    duration_s : float, optional
+        Of the run [s]: that of the flight unless given.
     troposphere : Troposphere
-    ground, airborne : ReceiverParams
+    weather : tuple of WeatherBox
+    ionosphere : IonosphereParams, optional
+        None is none.
+    fronts : tuple of WedgeFront or PlasmaBubble
+    scintillation : ScintillationParams, optional
+        None is none.
+    ground, airborne : ReceiverParams or ReceiverModel
     systems : str
         ``"G"``, ``"E"`` or ``"GE"``.
+    almanac : str
+        YUMA or SEM file whose orbits are taken; empty is none.
+    navigation : tuple of str
+        RINEX navigation files whose orbits are taken; without these and an almanac, orbits are nominal.
     start_week, start_tow_s
         First epoch; whole milliseconds.
     interval_s : float
@@ -55,11 +92,19 @@ class WorldParams:
     """
 
     receiver_ecef_m: tuple[tuple[float, float, float], ...]
-    flight: StraightIn
+    flight: FlightPath | None
+    station_ecef_m: tuple[float, float, float] | None = None
+    duration_s: float | None = None
     troposphere: Troposphere = Troposphere()
-    ground: ReceiverParams = GROUND_RECEIVER
-    airborne: ReceiverParams = AIRBORNE_RECEIVER
+    weather: tuple[WeatherBox, ...] = ()
+    ionosphere: IonosphereParams | None = None
+    fronts: tuple[WedgeFront | PlasmaBubble, ...] = ()
+    scintillation: ScintillationParams | None = None
+    ground: ReceiverParams | ReceiverModel = GROUND_RECEIVER
+    airborne: ReceiverParams | ReceiverModel = AIRBORNE_RECEIVER
     systems: str = "GE"
+    almanac: str = ""
+    navigation: tuple[str, ...] = ()
     start_week: int = 2400
     start_tow_s: float = 216_000.0
     interval_s: float = 0.5
@@ -75,6 +120,21 @@ class WorldParams:
         if not self.systems or len(set(self.systems)) != len(self.systems):
             raise ValueError(f"world: systems = {self.systems!r} is not G, E or GE")
         satellites_of(self.systems)
+        if self.almanac and self.navigation:
+            raise ValueError("world: almanac and navigation are both given; orbits have one source")
+        self._check_duration()
+        self._check_sites()
+
+    def _check_duration(self) -> None:
+        if self.flight is None and self.duration_s is None:
+            raise ValueError("world: duration_s is missing, and there is no flight to take it from")
+        if self.duration_s is not None:
+            _within("duration_s", self.duration_s, 0.0, LONGEST_S)
+            if self.flight is not None and self.duration_s > self.flight.duration_s:
+                longest = self.flight.duration_s
+                raise ValueError(f"world: duration_s = {self.duration_s:g} is longer than the flight, {longest:g}")
+
+    def _check_sites(self) -> None:
         if not 1 <= len(self.receiver_ecef_m) <= MAX_RECEIVERS:
             raise ValueError(
                 f"world: receiver_ecef_m has {len(self.receiver_ecef_m)} positions, not 1 to {MAX_RECEIVERS}"
@@ -82,11 +142,29 @@ class WorldParams:
         for number, position in enumerate(self.receiver_ecef_m, 1):
             if len(position) != 3 or not _EARTH_SURFACE_M[0] <= math.hypot(*position) <= _EARTH_SURFACE_M[1]:
                 raise ValueError(f"world: receiver_ecef_m of receiver {number} = {position!r} is not on the Earth")
+            away_m = math.dist(position, self.station.ecef_m)
+            if not away_m <= _FARTHEST_M:
+                raise ValueError(
+                    f"world: receiver_ecef_m of receiver {number} is {away_m:.0f} m from the station, more than "
+                    f"{_FARTHEST_M:.0f}"
+                )
+
+    @property
+    def station(self) -> Station:
+        """What distances are measured from."""
+        return Station(ecef_m=self.station_ecef_m or self.receiver_ecef_m[0])
+
+    @property
+    def length_s(self) -> float:
+        """Of the run [s]."""
+        if self.duration_s is not None:
+            return self.duration_s
+        return self.flight.duration_s if self.flight is not None else 0.0
 
     @property
     def n_epochs(self) -> int:
-        """Epochs until the aircraft crosses the threshold."""
-        return int(self.flight.duration_s / self.interval_s) + 1
+        """Epochs of the run; a flight's last is at or before its end."""
+        return int(self.length_s / self.interval_s) + 1
 
 
 def _within(key: str, value: float, low: float, high: float) -> None:
@@ -127,60 +205,92 @@ class SimulatedEpoch:
         Epoch key of the time tag, see :func:`gbas_core.gpstime.epoch_key`.
     ground : tuple of ObservationEpoch
         One a reference receiver.
-    airborne : ObservationEpoch
-    truth : Truth
+    airborne : ObservationEpoch or None
+        None without an aircraft.
+    truth : Truth or None
     """
 
     key: int
     ground: tuple[ObservationEpoch, ...]
-    airborne: ObservationEpoch
-    truth: Truth
+    airborne: ObservationEpoch | None
+    truth: Truth | None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Instant:
-    """Where everything is at one time tag; reference receivers first, the aircraft last."""
+    """Where everything is at one time tag and what arrives; reference receivers first, the aircraft last."""
 
     gps_week: int
     tow_s: float
-    clock_s: FloatArray
-    position_m: FloatArray
-    velocity_mps: FloatArray
+    clock: ClockState
+    arc: Arc
     seen: SatelliteState
-    delay_m: FloatArray
-    delay_rate_mps: FloatArray
+    paths: SignalPaths
     elevation_rad: FloatArray
+    cn0_dbhz: FloatArray
     tracked: NDArray[np.bool_]
-    tracked_before: NDArray[np.bool_]
+
+
+def open_orbits(params: WorldParams) -> Orbits:
+    """The satellites of a world.
+
+    Raises
+    ------
+    AlmanacError, RinexError
+        When a file cannot be used.
+    """
+    span = (params.start_week, params.start_tow_s, params.length_s)
+    systems = satellites_of(params.systems)
+    if params.navigation:
+        return recorded_orbits([Path(each) for each in params.navigation], *span, systems=systems)
+    if params.almanac:
+        return almanac_orbits(params.almanac, *span, seed=params.seed, systems=systems)
+    return nominal_orbits(*span, seed=params.seed, systems=systems)
 
 
 class World:
     """A world with given parameters.
 
+    Parameters
+    ----------
+    params : WorldParams
+    orbits : Orbits, optional
+        The satellites, in place of those the parameters say.
+
     Attributes
     ----------
     params : WorldParams
-    ephemeris : Ephemeris
-        What the satellites broadcast during the whole run, received an hour before it. A flight is shorter than the
-        ephemerides' validity.
+    orbits : Orbits
+    ephemerides : tuple of Ephemeris
+        What the satellites broadcast, in order of reception.
     """
 
-    def __init__(self, params: WorldParams) -> None:
+    def __init__(self, params: WorldParams, *, orbits: Orbits | None = None) -> None:
         self.params = params
-        self.ephemeris: Ephemeris = nominal_ephemeris(
-            params.start_week, params.start_tow_s, seed=params.seed, systems=satellites_of(params.systems)
-        )
+        self.orbits = open_orbits(params) if orbits is None else orbits
+        self.ephemerides: tuple[Ephemeris, ...] = self.orbits.received
         self._start_key = epoch_key(params.start_week, params.start_tow_s)
         self._interval_ms = round(params.interval_s * 1000.0)
         self._sites_m = np.array(params.receiver_ecef_m, dtype=np.float64)
-        self._banks = (
-            ReceiverBank.make(params.ground, params.seed, tuple(range(len(self._sites_m)))),
-            ReceiverBank.make(params.airborne, params.seed, (_AIRCRAFT_NUMBER,)),
+        common = {"seed": params.seed, "interval_s": params.interval_s}
+        numbers = tuple(range(len(self._sites_m)))
+        banks = [ReceiverBank(params.ground, numbers=numbers, **common)]  # type: ignore[arg-type]
+        if params.flight is not None:
+            banks.append(ReceiverBank(params.airborne, numbers=(AIRCRAFT_NUMBER,), **common))  # type: ignore[arg-type]
+        self._banks = tuple(banks)
+        self._numbers = tuple(number for bank in banks for number in bank.numbers)
+        self._rows = [slice(0, len(numbers)), slice(len(numbers), None)][: len(banks)]
+        self._group_delay_s = _group_delays_s(self.orbits)
+        self._ionosphere = None if params.ionosphere is None else Ionosphere(params=params.ionosphere, seed=params.seed)
+        self._scintillation = (
+            None if params.scintillation is None else Scintillation(params=params.scintillation, seed=params.seed)
         )
-        masks_rad = [bank.params.elevation_mask_rad for bank in self._banks for _ in bank.numbers]
-        self._masks_rad = np.array(masks_rad)[:, np.newaxis]
-        self._group_delay_s = np.array([group_delay_s(self.ephemeris, band) for band in range(N_BANDS)])
-        self._group_delay_s[L2] = np.nan
+        self._instants: dict[int, _Instant] = {}
+
+    @property
+    def ephemeris(self) -> Ephemeris:
+        """What the satellites broadcast at the start."""
+        return self.ephemerides[0]
 
     def __len__(self) -> int:
         return self.params.n_epochs
@@ -198,60 +308,128 @@ class World:
         """
         if not 0 <= number < len(self):
             raise IndexError(f"epoch {number} is not within 0 to {len(self) - 1}")
-        now = self._instant(number)
-        lines = sightlines(
-            self.ephemeris, now.gps_week, now.tow_s, now.clock_s, now.seen, now.position_m, now.velocity_mps
-        ).delayed(now.delay_m, now.delay_rate_mps)
+        before, now = self._instant(number - 1), self._instant(number)
+        arrivals = self._arrivals(now, before.tracked)
         observations: list[ObservationEpoch] = []
-        for bank in self._banks:
-            rows = slice(len(observations), len(observations) + len(bank.numbers))
+        for bank, rows in zip(self._banks, self._rows, strict=True):
             observations += bank.observe(
                 gps_week=now.gps_week,
                 tow_s=now.tow_s,
                 epoch=number,
-                clock_s=now.clock_s[rows],
-                lines=lines.of(rows),
+                clock=ClockState(now.clock.offset_s[rows], now.clock.drift[rows]),
                 group_delay_s=self._group_delay_s,
-                elevation_rad=now.elevation_rad[rows],
-                tracked=now.tracked[rows],
-                tracked_before=now.tracked_before[rows],
+                seen=_of(arrivals, rows),
             )
-        truth = Truth(
-            gps_week=now.gps_week, tow_s=now.tow_s, position_m=now.position_m[-1], velocity_mps=now.velocity_mps[-1]
-        )
-        key = epoch_key(now.gps_week, now.tow_s)
-        return SimulatedEpoch(key=key, ground=tuple(observations[:-1]), airborne=observations[-1], truth=truth)
+        key, count = epoch_key(now.gps_week, now.tow_s), len(self._sites_m)
+        truth = None
+        if self.params.flight is not None:
+            position_m, velocity_mps = now.paths.position_m[-1], now.paths.velocity_mps[-1]
+            truth = Truth(gps_week=now.gps_week, tow_s=now.tow_s, position_m=position_m, velocity_mps=velocity_mps)
+        airborne = observations[count] if len(observations) > count else None
+        return SimulatedEpoch(key=key, ground=tuple(observations[:count]), airborne=airborne, truth=truth)
+
+    def elevations_rad(self, number: int) -> FloatArray:
+        """Elevations ``(R, N_SATS)`` of the satellites at an epoch, the aircraft's last [rad]."""
+        return self._instant(number).elevation_rad
 
     def _instant(self, number: int) -> _Instant:
-        """Where everything is at an epoch, and what is tracked then and was tracked an epoch earlier."""
+        """The last few are kept, since every epoch needs the one before; what is kept changes nothing."""
+        if number not in self._instants:
+            self._instants[number] = self._make_instant(number)
+            if len(self._instants) > _INSTANTS_KEPT:
+                del self._instants[next(iter(self._instants))]
+        return self._instants[number]
+
+    def _make_instant(self, number: int) -> _Instant:
         week, tow_s = from_epoch_key(self._start_key + number * self._interval_ms)
-        back_s = 0.001 * self._interval_ms * np.array([0.0, 1.0])
-        since_s = 0.001 * (number * self._interval_ms) - back_s
-        clock_s = np.concatenate([bank.clock_s(since_s) for bank in self._banks], axis=-1)
-        position_m, velocity_mps = self._motion(since_s - clock_s[:, -1])
-        seen = sky(self.ephemeris, week, tow_s - back_s)
-        up, height_m = verticals(position_m)
-        elevation = elevations_rad(position_m, up, seen.position_m[:, np.newaxis])
-        tracked = elevation >= self._masks_rad
-        delay_m = self.params.troposphere.delay_m(height_m, elevation)
+        since_s = 0.001 * (number * self._interval_ms)
+        clocks = [bank.errors.clocks(number) for bank in self._banks]
+        clock = ClockState(*(np.concatenate(parts) for parts in zip(*clocks, strict=True)))
+        arc = self.orbits.arc(week, tow_s)
+        seen = sky(arc, np.array(tow_s))
+        paths = self._paths(week, tow_s, since_s, clock, seen)
+        elevation = np.arcsin(np.clip(paths.sin_elevation, -1.0, 1.0))
+        change_db, held = self._disturbed(paths)
+        cn0, tracked = [], []
+        for bank, rows in zip(self._banks, self._rows, strict=True):
+            cn0.append(bank.errors.cn0_dbhz(elevation[rows], change_db=change_db[rows]))
+            tracked.append(bank.errors.tracked(elevation[rows], cn0[-1]) & held[rows])
         return _Instant(
             gps_week=week,
             tow_s=tow_s,
-            clock_s=clock_s[0],
-            position_m=position_m[0],
-            velocity_mps=velocity_mps[0],
-            seen=SatelliteState(**{item.name: getattr(seen, item.name)[0] for item in fields(seen)}),
-            delay_m=delay_m[0],
-            delay_rate_mps=(delay_m[0] - delay_m[1]) / back_s[1],
-            elevation_rad=elevation[0],
-            tracked=tracked[0],
-            tracked_before=tracked[1],
+            clock=clock,
+            arc=arc,
+            seen=seen,
+            paths=paths,
+            elevation_rad=elevation,
+            cn0_dbhz=np.concatenate(cn0),
+            tracked=np.concatenate(tracked),
         )
 
-    def _motion(self, since_start_s: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Positions and velocities ``(T, R, 3)`` of all receivers with the aircraft's at given times ``(T,)``."""
-        position_m = np.empty((since_start_s.size, len(self._sites_m) + 1, 3))
-        velocity_mps = np.zeros_like(position_m)
-        position_m[:, :-1] = self._sites_m
-        position_m[:, -1], velocity_mps[:, -1] = self.params.flight.state(since_start_s)
-        return position_m, velocity_mps
+    def _paths(self, week: int, tow_s: float, since_s: float, clock: ClockState, seen: SatelliteState) -> SignalPaths:
+        """Receivers and satellites at the instant; the aircraft is where it is when its clock says so."""
+        position_m, velocity_mps = self._sites_m, np.zeros_like(self._sites_m)
+        if self.params.flight is not None:
+            place, moving = self.params.flight.state(np.array(since_s - clock.offset_s[-1]))
+            position_m = np.concatenate([position_m, place[np.newaxis]])
+            velocity_mps = np.concatenate([velocity_mps, moving[np.newaxis]])
+        return SignalPaths(
+            gps_week=week,
+            tow_s=tow_s,
+            since_start_s=since_s,
+            station=self.params.station,
+            position_m=position_m,
+            velocity_mps=velocity_mps,
+            satellite_m=seen.position_m,
+            satellite_mps=seen.velocity_mps,
+        )
+
+    def _disturbed(self, paths: SignalPaths) -> tuple[FloatArray, NDArray[np.bool_]]:
+        """Change of C/N0 [dB] and signals that can be held, ``(R, N_BANDS, N_SATS)`` each."""
+        shape = (len(self._numbers), N_BANDS, N_SATS)
+        change_db, held = np.zeros(shape), np.ones(shape, dtype=bool)
+        if self._scintillation is not None:
+            scintillation = self._scintillation.epoch(paths, self._numbers)
+            held &= ~scintillation.lost[:, np.newaxis]
+            change_db -= np.stack([scintillation.fading_db(band) for band in range(N_BANDS)], axis=1)
+        return change_db, held
+
+    def _arrivals(self, now: _Instant, tracked_before: NDArray[np.bool_]) -> Arrivals:
+        paths = now.paths
+        lines = sightlines(now.arc, now.tow_s, now.clock.offset_s, now.seen, paths.position_m, paths.velocity_mps)
+        air = self.params.troposphere.delay(paths)
+        for box in self.params.weather:
+            air = air + box.delay(paths)
+        nothing = np.zeros_like(air.delay_m)
+        dispersive = Delay(delay_m=nothing, rate_mps=nothing)
+        for effect in (*(() if self._ionosphere is None else (self._ionosphere,)), *self.params.fronts):
+            dispersive = dispersive + effect.delay(paths)
+        return Arrivals(
+            lines=lines.delayed(air.delay_m, air.rate_mps),
+            dispersive=dispersive,
+            code_m=0.0,
+            carrier_m=0.0,
+            rate_mps=0.0,
+            cn0_dbhz=now.cn0_dbhz,
+            elevation_rad=now.elevation_rad,
+            tracked=now.tracked,
+            tracked_before=tracked_before,
+        )
+
+
+def _group_delays_s(orbits: Orbits) -> FloatArray:
+    """Group delays (N_BANDS, N_SATS) of the first ephemeris each satellite has; NaN on L2, which is not simulated."""
+    delays = np.full((N_BANDS, N_SATS), np.nan)
+    for truth in orbits.truth:
+        own = np.array([group_delay_s(truth, band) for band in range(N_BANDS)])
+        delays = np.where(np.isnan(delays), own, delays)
+    delays[L2] = np.nan
+    return delays
+
+
+def _of(arrivals: Arrivals, rows: slice) -> Arrivals:
+    """The signals at some of the receivers."""
+    lines = arrivals.lines.of(rows)
+    delay = Delay(**{item.name: getattr(arrivals.dispersive, item.name)[rows] for item in fields(Delay)})
+    parts = {name: value[rows] for name, value in arrivals._asdict().items() if isinstance(value, np.ndarray)}
+    return arrivals._replace(lines=lines, dispersive=delay, **parts)

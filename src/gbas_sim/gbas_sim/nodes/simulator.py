@@ -6,14 +6,19 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from gbas_core.ephemeris import Ephemeris
+from gbas_core.gpstime import epoch_key
 from gbas_msgs_py import tables, topics
 from gbas_msgs_py.driver import DriverNode, DriverParams
+from gbas_msgs_py.joining import ReceptionQueue
 from gbas_msgs_py.node import run
 from gbas_msgs_py.tables import TruthEpoch
-from gbas_sim.scenario import read_sections, scenario_from_mapping, scenario_values
+from gbas_sim.scenario import open_world, read_sections, scenario_from_mapping, scenario_values
 from gbas_sim.world import SimulatedEpoch, Truth, World
 
 ACK_TIMEOUT_S = 10.0
+EPHEMERIS_LEAD_S = 60.0
+"""How long before they take effect ephemerides are sent [s]; nothing uses them for 120 s after."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,33 +40,60 @@ class Simulator(DriverNode[SimulatedEpoch]):
     params_type = SimulatorParams
 
     def __init__(self, **kwargs: Any) -> None:
+        self._world: World | None = None
         super().__init__("simulator", self.params_type, **kwargs)
-        config = self.params.config
-        given = {key: value for key, value in self.overrides().items() if key.startswith(("ground.", "sim."))}
-        sections = {**(read_sections(config) if config else {}), **given}
-        scenario = scenario_from_mapping(sections, source=config or "ROS parameters")
-        for key, value in scenario_values(scenario).items():
+        sections, _ = self._sections()
+        for key, value in scenario_values(self.world.params, sections).items():
             self.declare_read_only(key, value, "simulated world")
-        self.world = World(scenario)
+        self.ephemerides: ReceptionQueue[Ephemeris] = ReceptionQueue()
+        for each in self.world.ephemerides:
+            self.ephemerides.add(epoch_key(each.gps_week, each.tow_s), each)
         self.ephemeris = self.table_publisher(topics.EPHEMERIS, tables.EPHEMERIS, readers=1)
         self.receivers = [
             self.table_publisher(topic, tables.OBSERVATIONS, readers=1)
-            for topic in topics.GROUND_OBSERVATIONS[: len(scenario.receiver_ecef_m)]
+            for topic in topics.GROUND_OBSERVATIONS[: len(self.world.params.receiver_ecef_m)]
         ]
-        self.aircraft = self.table_publisher(topics.AIRBORNE_OBSERVATIONS, tables.OBSERVATIONS, readers=1)
-        self.truth = self.table_publisher(topics.TRUTH_AIRBORNE, tables.TRUTH)
+        if self.flies():
+            self.aircraft = self.table_publisher(topics.AIRBORNE_OBSERVATIONS, tables.OBSERVATIONS, readers=1)
+            self.truth = self.table_publisher(topics.TRUTH_AIRBORNE, tables.TRUTH)
+
+    @property
+    def world(self) -> World:
+        """The world of the parameters, made when it is first asked for."""
+        if self._world is None:
+            sections, source = self._sections()
+            self._world = open_world(scenario_from_mapping(sections, source=source), source=source)
+        return self._world
+
+    @world.setter
+    def world(self, world: World) -> None:
+        self._world = world
+
+    def _sections(self) -> tuple[dict[str, Any], str]:
+        config = self.params.config
+        given = {key: value for key, value in self.overrides().items() if key.startswith(("ground.", "sim."))}
+        return {**(read_sections(config) if config else {}), **given}, config or "ROS parameters"
+
+    def flies(self) -> bool:
+        return self.world.params.flight is not None
 
     def epochs(self) -> Iterator[SimulatedEpoch]:
-        self.ephemeris.publish(self.world.ephemeris)
-        if not self.ephemeris.settled(ACK_TIMEOUT_S):
-            self.problem("ephemerides not acknowledged", f"within {ACK_TIMEOUT_S:g} s")
         return iter(self.world)
 
     def send(self, epoch: SimulatedEpoch) -> None:
+        self._send_ephemerides(epoch.key + round(EPHEMERIS_LEAD_S * 1000.0))
         for publisher, observations in zip(self.receivers, epoch.ground, strict=True):
             publisher.publish(observations)
-        self.truth.publish(_truth_record(epoch.truth))
-        self.aircraft.publish(epoch.airborne)
+        if epoch.airborne is not None and epoch.truth is not None:
+            self.truth.publish(_truth_record(epoch.truth))
+            self.aircraft.publish(epoch.airborne)
+
+    def _send_ephemerides(self, key: int) -> None:
+        due = self.ephemerides.take(key)
+        for ephemeris in due:
+            self.ephemeris.publish(ephemeris)
+        if due and not self.ephemeris.settled(ACK_TIMEOUT_S):
+            self.problem("ephemerides not acknowledged", f"within {ACK_TIMEOUT_S:g} s")
 
 
 def _truth_record(truth: Truth) -> TruthEpoch:
