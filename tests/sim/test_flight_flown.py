@@ -408,7 +408,7 @@ def test_a_time_gives_the_same_bits_alone_and_among_others() -> None:
 
 PROBLEMS = {
     "steep": (
-        {"segments": (Climb(height_gain_m=5000.0, vertical_speed_mps=22.0, blend_s=60.0),)},
+        {"speed_mps": 130.0, "segments": (Climb(height_gain_m=3000.0, vertical_speed_mps=32.0, blend_s=30.0),)},
         ("segment 1 (climb)", "thrust less air brakes [N] =", "(airliner)"),
     ),
     "slow": ({"speed_mps": 40.0, "segments": (Cruise(duration_s=60.0),)}, ("segment 1 (cruise)", "lift coefficient =")),

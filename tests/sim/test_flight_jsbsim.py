@@ -6,6 +6,8 @@ then follow its trajectory: same gravity, ellipsoid, Coriolis acceleration and a
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -88,6 +90,12 @@ def integrated(rows: np.ndarray, surroundings: Surroundings) -> np.ndarray:
         rates, (0.0, rows[-1, 0]), begin, method="DOP853", rtol=1e-11, atol=1e-12, t_eval=rows[::RATE_HZ, 0]
     )
     return ecef_from_geodetic(solved.y[3], solved.y[4], solved.y[5])
+
+
+@pytest.fixture(autouse=True)
+def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its aircraft write their own output files where they are started."""
+    monkeypatch.chdir(tmp_path)
 
 
 @pytest.mark.parametrize(("model", "airspeed_mps"), [("737", 150.0), ("A320", 150.0), ("c172x", 55.0)])
