@@ -109,6 +109,8 @@ class EphemerisStore:
     """
 
     values: FloatArray = field(default_factory=lambda: missing(STORE_DEPTH, _N_ROWS))
+    _picked: dict[bytes, FloatArray] = field(default_factory=dict, init=False, repr=False)
+    """The last choice: it is asked for at every epoch and changes with the hour."""
 
     def add(self, ephemeris: Ephemeris) -> EphemerisStore:
         """Store with the ephemerides of one reception added; one that is stored already changes nothing.
@@ -172,11 +174,22 @@ class EphemerisStore:
         candidate = candidate & (np.abs(since_toe) <= VALIDITY_S) & (values[:, _COMPLETE] == 1.0)
         chosen = np.where(candidate, age_s, np.inf).argmin(axis=0)
         newest = np.where(age_s >= 0.0, age_s, np.inf).argmin(axis=0)
-        health = values[:, _ROW["health"]]
-        healthy = (health[chosen, _EVERY_SATELLITE] == 0.0) & (health[newest, _EVERY_SATELLITE] == 0.0)
-        found = candidate[chosen, _EVERY_SATELLITE] & healthy
-        picked = np.where(found, values[chosen, :, _EVERY_SATELLITE].T, np.nan)
-        picked.flags.writeable = False
+        healthy = values[:, _ROW["health"]] == 0.0
+        found = candidate & healthy
+        found = found[chosen, _EVERY_SATELLITE] & healthy[newest, _EVERY_SATELLITE]
+        picked = self._rows(np.where(found, chosen, -1))
         simulated = float((picked[_SIMULATED] > 0.0).any()) if found.any() else float("nan")
-        fields = {name: picked[row] for row, name in enumerate(FIELDS)}
+        fields = dict(zip(FIELDS, picked, strict=False))
         return Ephemeris(gps_week=gps_week, tow_s=tow_s, simulated=simulated, **fields)
+
+    def _rows(self, chosen: NDArray[np.int64]) -> FloatArray:
+        """Rows (rows, N_SATS) of the ephemerides at the given depths, NaN where the depth is -1; the same array again
+        while the choice is the same.
+        """
+        choice = chosen.tobytes()
+        if choice not in self._picked:
+            picked = np.where(chosen >= 0, self.values[chosen, :, _EVERY_SATELLITE].T, np.nan)
+            picked.flags.writeable = False
+            self._picked.clear()
+            self._picked[choice] = picked
+        return self._picked[choice]

@@ -326,16 +326,17 @@ def _tests(
     code = np.abs(epoch.carrier_m - epoch.code_m) > params.code_base_m + params.code_rate_mps * dt_s
 
     beside_m = epoch.carrier_m - epoch.doppler_mps * epoch.dt_s
-    beside_common_m, _ = _common(beside_m, params.min_satellites)
+    ahead_m = epoch.carrier_m - epoch.predicted_mps * epoch.dt_s
+    off_m = epoch.carrier_m - epoch.range_m
+    common_m, enough = _common(np.concatenate([beside_m, ahead_m, off_m]), params.min_satellites)
+    beside_common_m, ahead_common_m, off_common_m = np.split(common_m, 3)
+    _, enough_ahead, enough_off = np.split(enough, 3)
+
     still_m = params.doppler_base_m + params.doppler_noise_mps * dt_s
     doppler = _apart(beside_m - beside_common_m, los, still_m, dt_s**3 / 12.0, params)
 
-    ahead_m = epoch.carrier_m - epoch.predicted_mps * epoch.dt_s
-    ahead_common_m, enough_ahead = _common(ahead_m, params.min_satellites)
     rate = enough_ahead & _apart(ahead_m - ahead_common_m, los, params.rate_base_m, dt_s**3, params)
 
-    off_m = epoch.carrier_m - epoch.range_m
-    off_common_m, enough_off = _common(off_m, params.min_satellites)
     rate |= enough_off & (np.abs(off_m - off_common_m) > params.rate_base_m + params.range_rate_mps * dt_s)
 
     tested = np.isfinite(beside_m) | (enough_ahead & np.isfinite(ahead_m)) | (enough_off & np.isfinite(off_m))
@@ -399,9 +400,9 @@ def _on_rows(value: FloatArray, rows: BoolArray) -> FloatArray:
 def _common(residual_m: FloatArray, min_satellites: int) -> tuple[FloatArray, BoolArray]:
     """Median over satellites and bands (R, 1, 1), 0 if there are too few satellites, and whether there are enough."""
     present = np.isfinite(residual_m)
-    enough = np.count_nonzero(present.any(axis=1), axis=-1) >= max(min_satellites, 1)
+    enough = present.any(axis=1).sum(axis=-1) >= max(min_satellites, 1)
     ordered = np.sort(residual_m.reshape(len(residual_m), -1), axis=-1)  # NaN last
-    number = np.count_nonzero(present.reshape(ordered.shape), axis=-1)
+    number = present.reshape(ordered.shape).sum(axis=-1)
     rows = np.arange(len(ordered))
     low, high = np.maximum(number - 1, 0) // 2, np.minimum(number // 2, ordered.shape[-1] - 1)
     median = np.where(enough, 0.5 * (ordered[rows, low] + ordered[rows, high]), 0.0)

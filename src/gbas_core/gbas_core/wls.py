@@ -117,7 +117,7 @@ def _check_shapes(los: FloatArray, sigma_m: FloatArray, groups: BoolArray) -> No
             f"shapes los {los.shape}, sigma_m {sigma_m.shape}, clock_groups {groups.shape}: "
             "expected (3, N), (N,), (k, N)"
         )
-    if (np.count_nonzero(groups, axis=0) > 1).any():
+    if (groups.sum(axis=0) > 1).any():
         raise ValueError("clock_groups: a satellite is in more than one group")
 
 

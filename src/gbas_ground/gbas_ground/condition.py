@@ -54,7 +54,7 @@ def conclude(
     no_rate = ~np.isfinite(made.prc_m + made.rrc_mps).all(axis=0)
 
     excluded = ChannelState.EXCLUDED
-    reasons: tuple[tuple[ArrayLike, ChannelState, ArrayLike], ...] = (
+    reasons: tuple[tuple[BoolArray, ChannelState, ArrayLike], ...] = (
         (~seen & ~visible, ChannelState.NOT_TRACKED, ExclusionCause.NONE),
         (~seen, ChannelState.NOT_TRACKED, ExclusionCause.NOT_TRACKED),
         (np.isnan(measured.elevation_rad + known.crc), excluded, ExclusionCause.NO_EPHEMERIS),
@@ -70,8 +70,9 @@ def conclude(
     state = np.full(N_SATS, float(ChannelState.USABLE))
     cause = np.zeros(N_SATS)
     for mask, its_state, its_cause in reversed(reasons):
-        state = np.where(mask, float(its_state), state)
-        cause = np.where(mask, its_cause, cause)
+        if mask.any():
+            state = np.where(mask, float(its_state), state)
+            cause = np.where(mask, its_cause, cause)
     return Condition(state=state, cause=cause)
 
 

@@ -8,6 +8,7 @@ that could not be seen starts the time anew, and a gap in the data counts nothin
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from gbas_ground.causes import ExclusionCause
 from gbas_ground.corrections import BoolArray
 
 IntArray = NDArray[np.int64]
+_NONE = int(ExclusionCause.NONE)  # comparing arrays with members of an enumeration is slow
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -34,10 +36,10 @@ class Latch:
     cause: IntArray
     clear_s: FloatArray
 
-    @property
+    @cached_property
     def excluded(self) -> BoolArray:
         """Mask of what is excluded."""
-        return np.asarray(self.cause != ExclusionCause.NONE)
+        return np.asarray(self.cause != _NONE)
 
 
 def initial_latch(*shape: int) -> Latch:

@@ -293,7 +293,7 @@ def _process(
     )
     made, new_exclusions, findings = agree(measured, new_exclusions, params)
     events.found(findings)
-    channel_ok = tracked & ~np.any([check.failed for _, check in checks], axis=0)
+    channel_ok = tracked & ~np.logical_or.reduce([check.failed for _, check in checks])
     new_exclusions = _advanced(new_exclusions, measured, made, channel_ok, dt_s, params)
 
     condition = conclude(tracked, tracks, known, measured, made, new_exclusions, params)
@@ -375,7 +375,7 @@ def _released(exclusions: Exclusions, params: GroundParams, events: _Events) -> 
     for row in np.flatnonzero(receivers_ended):
         cause = ExclusionCause(int(exclusions.receivers.cause[row]))
         events.add(EventKind.READMISSION, f"rr{row + 1}", cause.word, params.readmission_time_s)
-    for row, satellite in np.argwhere(channels_ended):
+    for row, satellite in np.argwhere(channels_ended) if channels_ended.any() else ():
         cause = ExclusionCause(int(exclusions.channels.cause[row, satellite]))
         events.add(EventKind.READMISSION, f"rr{row + 1}/{SAT_IDS[satellite]}", cause.word, params.readmission_time_s)
     return Exclusions(channels=channels, receivers=receivers, satellites=satellites)
@@ -396,6 +396,8 @@ def _channel_checks(raw: RawEpoch, should: Expected, tracked: BoolArray, params:
 def _exclude_channels(exclusions: Exclusions, checks: _Checks, events: _Events) -> Exclusions:
     channels = exclusions.channels
     for cause, check in checks:
+        if not check.failed.any():
+            continue
         for row, satellite in np.argwhere(check.failed & ~channels.excluded):
             value, threshold = check.at(row, satellite)
             events.add(EventKind.EXCLUSION, f"rr{row + 1}/{SAT_IDS[satellite]}", cause.word, value, threshold)

@@ -33,10 +33,9 @@ def check_expected_range(raw_correction_m: FloatArray, tracked: BoolArray, limit
     With one satellite of a constellation the residual is zero and with two a fault shows on both: the smallest common
     set of the corrections is larger than that.
     """
-    residual = np.full(raw_correction_m.shape, np.nan)
-    for group in CLOCK_GROUPS:
-        own = np.where(tracked & group, raw_correction_m, np.nan)
-        residual = np.where(group, own - _median(own), residual)
+    own = np.where(tracked & CLOCK_GROUPS[:, np.newaxis], raw_correction_m, np.nan)  # (k, R, N)
+    by_group = own - _median(own)
+    residual = np.where(CLOCK_GROUPS[0], by_group[0], by_group[1])
     return upper_limit(np.abs(residual), limit_m, tracked)
 
 
