@@ -42,7 +42,7 @@ APPROACH = FinalApproach.from_course(
     tch_m=15.0,
     gpa_rad=math.radians(3.0),
 )
-START = Start(lat_rad=0.91, lon_rad=0.18, height_m=600.0, heading_rad=0.4)
+START = Start(latitude_rad=0.91, longitude_rad=0.18, height_m=600.0, heading_rad=0.4)
 SHEAR = Wind(
     height_m=(0.0, 500.0, 1500.0), speed_mps=(5.0, 10.0, 20.0), from_rad=(math.radians(230.0), 4.2, math.radians(270.0))
 )
@@ -380,7 +380,7 @@ def test_without_the_turning_earth_headings_stay() -> None:
     # The plan's accelerations are differences of its velocities: 1e-7 of g.
     np.testing.assert_allclose(still.bank_rad, 0.0, atol=1e-6)
     # 2 w V sin(lat) to the right and V^2/r tan(lat) sin(heading): a small bank to the left holds the plan's heading.
-    lat = START.lat_rad
+    lat = START.latitude_rad
     sideways = 2.0 * 7.292e-5 * 120.0 * math.sin(lat) + 120.0**2 / 6.39e6 * math.tan(lat) * math.sin(START.heading_rad)
     np.testing.assert_allclose(turning.bank_rad, -sideways / 9.81, rtol=0.02)
 

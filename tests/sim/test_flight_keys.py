@@ -92,7 +92,7 @@ def test_defaults_and_start() -> None:
     assert flight.wind.calm
     assert flight.plan.approach is None
     assert flight.plan.start == Start(
-        lat_rad=math.radians(52.0), lon_rad=math.radians(10.5), height_m=600.0, heading_rad=math.pi / 2.0
+        latitude_rad=math.radians(52.0), longitude_rad=math.radians(10.5), height_m=600.0, heading_rad=math.pi / 2.0
     )
 
 
@@ -124,17 +124,17 @@ def segment(**keys):
         (changed(turning_earth="no"), "turning_earth = 'no' is not true or false"),
         (changed(profile="five_phase"), "speed_mps is given, but profile says what is flown"),
         ({"profile": "six_phase"}, "profile = 'six_phase' is not five_phase"),
-        (changed(start={"latitude_deg": 1.0}), "start.longitude_deg is missing"),
+        (changed(start={"latitude_deg": 1.0}), "start: longitude_deg is missing"),
         (
             changed(start={"latitude_deg": 1, "longitude_deg": 1, "height_m": 1, "heading_deg": 1}),
             "start is given, but the flight is laid out from its approach",
         ),
-        (changed(wind={"speed_mps": 5.0}), "wind.speed_mps = 5.0 is not a list of numbers"),
+        (changed(wind={"speed_mps": 5.0}), "wind.speed_mps = 5.0 is not a list"),
         (changed(wind={"height_m": [0.0], "speed_mps": [-5.0], "from_deg": [0.0]}), "wind: wind: speed_mps"),
         (changed(wind={"gusts": 1}), "wind.gusts is unknown"),
         (segment(kind="loop"), "segments.2.kind = 'loop' is not one of cruise, climb"),
         (segment(kind="turn", bank_deg=20.0), "segments.2: heading_change_deg is missing"),
-        (segment(kind="turn", heading_change_deg=9.0, bank_deg="x"), "segments.2.bank_deg = 'x' is not a number"),
+        (segment(kind="turn", heading_change_deg=9.0, bank_deg="x"), "segments.2.bank_deg = 'x' is not a float"),
         (segment(kind="turn", heading_change_deg=9.0, bank_deg=89.0), "segments.2: turn: bank_rad = 1.55334 (89 deg)"),
         (segment(kind="turn", heading_change_deg=9.0), "neither is given, exactly one of bank_rad and duration_s"),
         (segment(kind="turn", heading_change_deg=9.0, bank_rad=0.1), "segments.2.bank_rad is unknown"),

@@ -24,9 +24,8 @@ Manoeuvres have the fields of :mod:`gbas_sim.flight_dynamics.segments`, with ``_
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any, Final
 
 from gbas_core.approach import FinalApproach
@@ -37,16 +36,11 @@ from gbas_sim.flight_dynamics.flight import Flight
 from gbas_sim.flight_dynamics.plan import FlightPlan, Start
 from gbas_sim.flight_dynamics.segments import KINDS, Approach, Segment
 from gbas_sim.flight_dynamics.wind import Wind
+from gbas_sim.keys import record_from_keys
 
-_KEYS: Final = ("aircraft", "mass_kg", "profile", "turning_earth", "start", "wind", "planned_wind")
+_WINDS: Final = ("wind", "planned_wind")
 _PLAN_KEYS: Final = ("speed_mps", "configuration", "segments")
-_START_KEYS: Final = {
-    "latitude_deg": "lat_rad",
-    "longitude_deg": "lon_rad",
-    "height_m": "height_m",
-    "heading_deg": "heading_rad",
-}
-_WIND_KEYS: Final = {"height_m": "height_m", "speed_mps": "speed_mps", "from_deg": "from_rad"}
+_KEYS: Final = ("aircraft", "mass_kg", "profile", "turning_earth", "start", *_WINDS, *_PLAN_KEYS)
 
 
 def flight_from_mapping(mapping: Mapping[str, Any], *, approach: FinalApproach | None = None) -> Flight:
@@ -64,121 +58,68 @@ def flight_from_mapping(mapping: Mapping[str, Any], *, approach: FinalApproach |
     ValueError
         Naming a key that is unknown, missing, of the wrong kind or out of bounds.
     """
-    keys = _nested(mapping)
-    _known(keys, (*_KEYS, *_PLAN_KEYS), "")
-    winds = {name: _wind(name, keys[name]) for name in ("wind", "planned_wind") if name in keys}
+    try:
+        return _flight(_nested(mapping), approach)
+    except ValueError as error:
+        raise ValueError(f"flight: {error}") from None
+
+
+def _flight(keys: Mapping[str, Any], approach: FinalApproach | None) -> Flight:
+    if unknown := sorted(str(key) for key in keys if key not in _KEYS):
+        raise ValueError(f"{unknown[0]} is unknown; known are {', '.join(sorted(_KEYS))}")
+    winds = {name: record_from_keys(Wind, _section(name, keys[name]), f"{name}.") for name in _WINDS if name in keys}
     turning = keys.get("turning_earth", True)
     if type(turning) is not bool:
-        raise ValueError(f"flight: turning_earth = {turning!r} is not true or false")
+        raise ValueError(f"turning_earth = {turning!r} is not true or false")
     return Flight(plan=_plan(keys, approach), aircraft=_aircraft(keys), turning_earth=turning, **winds)
 
 
 def _plan(keys: Mapping[str, Any], approach: FinalApproach | None) -> FlightPlan:
-    start = _start(keys["start"]) if "start" in keys else None
+    start = record_from_keys(Start, _section("start", keys["start"]), "start.") if "start" in keys else None
     if "profile" in keys:
         if keys["profile"] != "five_phase":
-            raise ValueError(f"flight: profile = {keys['profile']!r} is not five_phase")
+            raise ValueError(f"profile = {keys['profile']!r} is not five_phase")
         if double := [key for key in _PLAN_KEYS if key in keys]:
-            raise ValueError(f"flight: {double[0]} is given, but profile says what is flown")
+            raise ValueError(f"{double[0]} is given, but profile says what is flown")
         return five_phase_plan(start=start, approach=approach if start is None else None)
     if missing := [key for key in ("speed_mps", "segments") if key not in keys]:
-        raise ValueError(f"flight: {missing[0]} is missing")
+        raise ValueError(f"{missing[0]} is missing")
     segments = _segments(keys["segments"])
-    try:
-        return FlightPlan(
-            segments=segments,
-            speed_mps=_number("speed_mps", keys["speed_mps"]),
-            configuration=keys.get("configuration", "clean"),
-            start=start,
-            approach=approach if any(isinstance(segment, Approach) for segment in segments) else None,
-        )
-    except ValueError as error:
-        raise ValueError(f"flight: {error}") from None
+    return FlightPlan(
+        segments=segments,
+        speed_mps=_number("speed_mps", keys["speed_mps"]),
+        configuration=keys.get("configuration", "clean"),
+        start=start,
+        approach=approach if any(isinstance(segment, Approach) for segment in segments) else None,
+    )
 
 
 def _segments(value: Any) -> tuple[Segment, ...]:
     if isinstance(value, Mapping):
         numbers = {str(key): each for key, each in value.items()}
         expected = [str(number) for number in range(1, len(numbers) + 1)]
-        if sorted(numbers) != sorted(expected):
-            raise ValueError(f"flight: segments has the keys {', '.join(sorted(numbers))}, not 1 to {len(numbers)}")
+        if set(numbers) != set(expected):
+            raise ValueError(f"segments has the keys {', '.join(sorted(numbers))}, not 1 to {len(numbers)}")
         value = [numbers[number] for number in expected]
     if not isinstance(value, list | tuple):
-        raise ValueError(f"flight: segments = {value!r} is not a list of manoeuvres")
+        raise ValueError(f"segments = {value!r} is not a list of manoeuvres")
     return tuple(_segment(f"segments.{number}", each) for number, each in enumerate(value, 1))
 
 
 def _segment(path: str, value: Any) -> Segment:
     section = dict(_section(path, value))
     kind = section.pop("kind", None)
-    if kind not in KINDS:
-        raise ValueError(f"flight: {path}.kind = {kind!r} is not one of {', '.join(KINDS)}")
-    chosen = KINDS[kind]
-    names = {_in_files(item.name): item.name for item in fields(chosen)}
-    _known(section, tuple(names), f"{path}.")
-    arguments = {names[key]: _converted(f"{path}.{key}", key, each) for key, each in section.items()}
-    try:
-        return chosen(**arguments)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"flight: {path}: {_plain(error)}") from None
-
-
-def _in_files(name: str) -> str:
-    """A field's name in files."""
-    return name.replace("_radps", "_degps").replace("_rad", "_deg") if "_rad" in name and "radius" not in name else name
-
-
-def _converted(path: str, key: str, value: Any) -> Any:
-    if key == "configuration":
-        return value
-    number = _number(path, value)
-    return math.radians(number) if key.endswith(("_deg", "_degps")) else number
-
-
-def _plain(error: Exception) -> str:
-    """A missing argument as a missing key."""
-    text = str(error)
-    return f"{_in_files(text.split(chr(39))[1])} is missing" if "required keyword-only" in text else text
+    if not isinstance(kind, str) or kind not in KINDS:
+        raise ValueError(f"{path}.kind = {kind!r} is not one of {', '.join(KINDS)}")
+    return record_from_keys(KINDS[kind], section, f"{path}.")
 
 
 def _aircraft(keys: Mapping[str, Any]) -> Aircraft:
     name = keys.get("aircraft", "fighter" if "profile" in keys else "airliner")
-    if name not in FLEET:
-        raise ValueError(f"flight: aircraft = {name!r} is not one of {', '.join(FLEET)}")
+    if not isinstance(name, str) or name not in FLEET:
+        raise ValueError(f"aircraft = {name!r} is not one of {', '.join(FLEET)}")
     aircraft = FLEET[name]
-    if "mass_kg" not in keys:
-        return aircraft
-    try:
-        return replace(aircraft, mass_kg=_number("mass_kg", keys["mass_kg"]))
-    except ValueError as error:
-        raise ValueError(f"flight: {error}") from None
-
-
-def _start(value: Any) -> Start:
-    section = _section("start", value)
-    _known(section, tuple(_START_KEYS), "start.")
-    if missing := [key for key in _START_KEYS if key not in section]:
-        raise ValueError(f"flight: start.{missing[0]} is missing")
-    values = {name: _converted(f"start.{key}", key, section[key]) for key, name in _START_KEYS.items()}
-    try:
-        return Start(**values)
-    except ValueError as error:
-        raise ValueError(f"flight: {error}") from None
-
-
-def _wind(name: str, value: Any) -> Wind:
-    section = _section(name, value)
-    _known(section, tuple(_WIND_KEYS), f"{name}.")
-    values: dict[str, tuple[float, ...]] = {}
-    for key, field in _WIND_KEYS.items():
-        given = section.get(key, [])
-        if not isinstance(given, list | tuple):
-            raise ValueError(f"flight: {name}.{key} = {given!r} is not a list of numbers")
-        values[field] = tuple(_converted(f"{name}.{key}", key, each) for each in given)
-    try:
-        return Wind(**values)
-    except ValueError as error:
-        raise ValueError(f"flight: {name}: {error}") from None
+    return replace(aircraft, mass_kg=_number("mass_kg", keys["mass_kg"])) if "mass_kg" in keys else aircraft
 
 
 def _nested(mapping: Mapping[str, Any]) -> dict[str, Any]:
@@ -190,23 +131,18 @@ def _nested(mapping: Mapping[str, Any]) -> dict[str, Any]:
         for part in outer:
             section = section.setdefault(part, {})
             if not isinstance(section, dict):
-                raise ValueError(f"flight: {key} is given within {part}, which is not a section")
+                raise ValueError(f"{key} is given within {part}, which is not a section")
         section[last] = _nested(value) if isinstance(value, Mapping) else value
     return nested
 
 
 def _section(path: str, value: Any) -> Mapping[str, Any]:
     if not isinstance(value, Mapping):
-        raise ValueError(f"flight: {path} = {value!r} is not a section")
+        raise ValueError(f"{path} = {value!r} is not a section")
     return value
-
-
-def _known(section: Mapping[str, Any], known: tuple[str, ...], prefix: str) -> None:
-    if unknown := sorted(str(key) for key in section if key not in known):
-        raise ValueError(f"flight: {prefix}{unknown[0]} is unknown; known are {', '.join(sorted(known))}")
 
 
 def _number(path: str, value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError(f"flight: {path} = {value!r} is not a number")
+        raise ValueError(f"{path} = {value!r} is not a number")
     return float(value)

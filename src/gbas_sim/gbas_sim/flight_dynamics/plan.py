@@ -16,21 +16,21 @@ class Start:
 
     Attributes
     ----------
-    lat_rad, lon_rad, height_m : float
+    latitude_rad, longitude_rad, height_m : float
         Geodetic position [rad], height above the ellipsoid [m].
     heading_rad : float
         True heading [rad].
     """
 
-    lat_rad: float
-    lon_rad: float
+    latitude_rad: float
+    longitude_rad: float
     height_m: float
     heading_rad: float
 
     def __post_init__(self) -> None:
         bounds = {
-            "lat_rad": (math.radians(-85.0), math.radians(85.0)),
-            "lon_rad": (-math.pi, math.pi),
+            "latitude_rad": (math.radians(-85.0), math.radians(85.0)),
+            "longitude_rad": (-math.pi, math.pi),
             "height_m": (-400.0, 20_000.0),
             "heading_rad": (-2.0 * math.pi, 2.0 * math.pi),
         }

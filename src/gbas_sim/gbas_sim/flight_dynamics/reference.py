@@ -106,7 +106,10 @@ def _legs(plan: FlightPlan, wind: Wind) -> list[Leg]:
         assert plan.start is not None
         start = plan.start
         joint = Joint(
-            lat_rad=start.lat_rad, lon_rad=start.lon_rad, height_m=start.height_m, heading_rad=start.heading_rad
+            lat_rad=start.latitude_rad,
+            lon_rad=start.longitude_rad,
+            height_m=start.height_m,
+            heading_rad=start.heading_rad,
         )
         first = 0
     else:
