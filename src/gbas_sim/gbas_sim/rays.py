@@ -13,7 +13,7 @@ propagation, QUT (2001), ch. 3 and 4; Recommendations ITU-R P.2040 and P.527 (ma
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Final, NamedTuple
 
@@ -29,6 +29,7 @@ from gbas_sim.tracking import MODULATIONS, SIGNALS, per_signal
 
 BoolArray = NDArray[np.bool_]
 ComplexArray = NDArray[np.complex128]
+IndexArray = NDArray[np.intp]
 
 _BANDS: Final = (L1, L5)
 _EDGE: Final = 1e-9
@@ -62,20 +63,28 @@ class Material:
             {"permittivity": (1.0, 1000.0), "conductivity_spm": (0.0, 1e8), "roughness_m": (0.0, 10.0)},
         )
 
-    def reflection(self, sine: FloatArray, frequency_hz: float) -> tuple[ComplexArray, ComplexArray]:
-        """Reflection of a right-handed wave, by the sine of its grazing angle: right-handed and left-handed parts [-].
 
-        Source: Recommendation ITU-R P.2040; half the sum and half the difference of the Fresnel coefficients for both
-        linear polarisations, as in Hannah (2001), 3.3; loss by roughness, exp(-2 (2 pi s sin(grazing) / wavelength)^2),
-        Ament, Proc. IRE 41 (1953).
-        """
-        epsilon = self.permittivity - 1j * self.conductivity_spm / (2.0 * math.pi * frequency_hz * _VACUUM_FPM)
-        root = np.sqrt(epsilon - 1.0 + sine**2)
-        horizontal = (sine - root) / (sine + root)
-        vertical = (epsilon * sine - root) / (epsilon * sine + root)
-        phase = 2.0 * math.pi * self.roughness_m * sine * (frequency_hz / SPEED_OF_LIGHT_MPS)
-        smooth = np.exp(-2.0 * phase**2)
-        return 0.5 * (horizontal + vertical) * smooth, 0.5 * (vertical - horizontal) * smooth
+def circular_reflection(
+    permittivity: ArrayLike,
+    conductivity_spm: ArrayLike,
+    roughness_m: ArrayLike,
+    sine: FloatArray,
+    frequency_hz: float,
+) -> tuple[ComplexArray, ComplexArray]:
+    """Reflection of a right-handed wave, by the sine of its grazing angle: right-handed and left-handed parts [-].
+
+    Source: Recommendation ITU-R P.2040; half the sum and half the difference of the Fresnel coefficients for both
+    linear polarisations, as in Hannah (2001), 3.3; loss by roughness, exp(-2 (2 pi s sin(grazing) / wavelength)^2),
+    Ament, Proc. IRE 41 (1953).
+    """
+    conduction = np.asarray(conductivity_spm) / (2.0 * math.pi * frequency_hz * _VACUUM_FPM)
+    epsilon = np.asarray(permittivity) - 1j * conduction
+    root = np.sqrt(epsilon - 1.0 + sine**2)
+    horizontal = (sine - root) / (sine + root)
+    vertical = (epsilon * sine - root) / (epsilon * sine + root)
+    phase = 2.0 * math.pi * np.asarray(roughness_m) * sine * (frequency_hz / SPEED_OF_LIGHT_MPS)
+    smooth = np.exp(-2.0 * phase**2)
+    return 0.5 * (horizontal + vertical) * smooth, 0.5 * (vertical - horizontal) * smooth
 
 
 _VACUUM_FPM: Final = 8.8541878128e-12
@@ -185,14 +194,14 @@ def _triple(vector: FloatArray) -> tuple[float, float, float]:
 
 
 class Rays(NamedTuple):
-    """Reflections at the antennas, (K, R, S): K facets in order, then the ground if there is one.
+    """Reflections at the antennas; K is the largest number of them at any antenna from any satellite.
 
     Attributes
     ----------
     visible : (R, S) bool array
         Whether the direct ray reaches the antenna.
     delay_m : (K, R, S) array
-        Path of each reflection less that of the direct signal [m]; 0 where there is no reflection.
+        Path of each reflection less that of the direct signal [m]; 0 where there is none.
     amplitude : (K, R, N_BANDS, S) complex array
         Reflection over direct signal at the antenna's output, without the phase of the delay; 0 where there is none.
     """
@@ -225,9 +234,11 @@ class Scene:
         return _Planes.of(self.facets, self.ground is not None)
 
     @cached_property
-    def _materials(self) -> tuple[Material, ...]:
+    def _materials(self) -> FloatArray:
+        """Permittivity, conductivity and roughness of facets and ground, (3, K)."""
         names = [facet.material for facet in self.facets] + ([] if self.ground is None else [self.ground])
-        return tuple(MATERIALS[name] for name in names)
+        found = [MATERIALS[name] for name in names]
+        return np.array([[each.permittivity, each.conductivity_spm, each.roughness_m] for each in found]).T
 
     def trace(self, antenna_m: FloatArray, los: FloatArray, pattern: AntennaPattern) -> Rays:
         """Reflections towards antennas from plane waves.
@@ -247,42 +258,34 @@ class Scene:
         visible = np.isfinite(towards[..., 2]) & ~planes.meet(origin, towards, np.inf).any(axis=-1)
         if self.ground is not None:
             visible &= towards[..., 2] > 0.0
-        mirror = _Mirror.of(planes, origin, towards)
-        there = mirror.possible & planes.contain(mirror.point_m)
-        if self.ground is not None:
-            there &= mirror.point_m[..., 2] >= -_EDGE
-        _only_free(there, planes, mirror, origin, towards)
-        amplitude = np.zeros((*there.shape[:2], N_BANDS, there.shape[2]), dtype=np.complex128)
-        for number, material in enumerate(self._materials):
-            amplitude[number] = _relative_amplitude(material, pattern, mirror.of_plane(number), towards)
-        amplitude *= there[:, :, np.newaxis, :]
-        return Rays(visible=visible, delay_m=np.where(there, mirror.delay_m, 0.0), amplitude=np.nan_to_num(amplitude))
-
-
-def _only_free(there: BoolArray, planes: _Planes, mirror: _Mirror, origin: FloatArray, towards: FloatArray) -> None:
-    """Take out the reflections of whose ways one is not free."""
-    number, row, satellite = np.nonzero(there)
-    point, start = mirror.point_m[number, row, satellite], origin[row, satellite]
-    way = point - start
-    length = np.sqrt(_dot(way, way))
-    hidden = planes.meet(start, way / length[:, np.newaxis], length)
-    hidden |= planes.meet(point, towards[row, satellite], np.inf)
-    hidden[np.arange(number.size), number] = False
-    there[number, row, satellite] = ~hidden.any(axis=-1)
+        echoes = _Echoes.of(planes, origin, towards, above_ground=self.ground is not None)
+        places = echoes.rank.max(initial=-1) + 1
+        delay_m = np.zeros((places, *visible.shape))
+        amplitude = np.zeros((places, visible.shape[0], N_BANDS, visible.shape[1]), dtype=np.complex128)
+        delay_m[echoes.rank, echoes.row, echoes.satellite] = echoes.delay_m
+        if places:
+            materials = self._materials[:, echoes.plane]
+            for band in _BANDS:
+                strength = echoes.amplitude(materials, pattern, float(FREQUENCY_HZ[band]))
+                amplitude[echoes.rank, echoes.row, band, echoes.satellite] = strength
+        return Rays(visible=visible, delay_m=delay_m, amplitude=amplitude)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _Mirror:
-    """The reflection of plane waves in planes, seen from antennas; arrays (K, R, S), vectors (K, R, S, 3)."""
+class _Echoes:
+    """Single reflections, ``(E,)`` of them: whose they are, in which plane, and what they are like."""
 
-    possible: BoolArray
+    plane: IndexArray
+    row: IndexArray
+    satellite: IndexArray
+    rank: IndexArray
     delay_m: FloatArray
     sine: FloatArray
-    point_m: FloatArray
     arrival_up: FloatArray
+    direct_up: FloatArray
 
     @classmethod
-    def of(cls, planes: _Planes, origin: FloatArray, towards: FloatArray) -> _Mirror:
+    def of(cls, planes: _Planes, origin: FloatArray, towards: FloatArray, *, above_ground: bool) -> _Echoes:
         """Image method: the antenna's image is 2 h below it along the normal, the extra path 2 h sin(grazing angle).
 
         Source: Sabatini et al., eq (25) to (28), with dot products, for a satellite at infinity.
@@ -293,32 +296,43 @@ class _Mirror:
         possible = (height > _CLEAR_M) & (sine > _EDGE)
         arrival = towards - 2.0 * sine[..., np.newaxis] * normal
         way = np.where(possible, height, 0.0) / np.where(possible, sine, 1.0)
+        point = origin + way[..., np.newaxis] * arrival
+        there = possible & planes.contain(point)
+        if above_ground:
+            there &= point[..., 2] >= -_EDGE
+        plane, row, satellite = np.nonzero(there)
+        there[plane, row, satellite] = _free(
+            planes, plane, origin[row, satellite], point[there], towards[row, satellite]
+        )
+        plane, row, satellite = np.nonzero(there)
         return cls(
-            possible=possible,
-            delay_m=2.0 * height * sine,
-            sine=np.where(possible, sine, 1.0),
-            point_m=origin + way[..., np.newaxis] * arrival,
-            arrival_up=arrival[..., 2],
+            plane=plane,
+            row=row,
+            satellite=satellite,
+            rank=(np.cumsum(there, axis=0) - 1)[there],
+            delay_m=2.0 * height[there] * sine[there],
+            sine=sine[there],
+            arrival_up=arrival[..., 2][there],
+            direct_up=towards[row, satellite, 2],
         )
 
-    def of_plane(self, number: int) -> _Mirror:
-        """The reflection in one of the planes, (R, S)."""
-        return _Mirror(**{item.name: getattr(self, item.name)[number] for item in fields(self)})
+    def amplitude(self, materials: FloatArray, pattern: AntennaPattern, frequency_hz: float) -> ComplexArray:
+        """Reflection over direct signal at the antenna's output, ``(E,)``."""
+        arrival_rad, direct_rad = (np.arcsin(np.clip(each, -1.0, 1.0)) for each in (self.arrival_up, self.direct_up))
+        direct_dbic = pattern.gain_at_dbic(direct_rad)
+        same = 10.0 ** (0.05 * (pattern.gain_at_dbic(arrival_rad) - direct_dbic))
+        other = 10.0 ** (0.05 * (pattern.cross_at_dbic(arrival_rad) - direct_dbic))
+        right, left = circular_reflection(materials[0], materials[1], materials[2], self.sine, frequency_hz)
+        return np.asarray(right * same + left * other)
 
 
-def _relative_amplitude(
-    material: Material, pattern: AntennaPattern, mirror: _Mirror, towards: FloatArray
-) -> ComplexArray:
-    """Reflection over direct signal at the antenna's output, (R, N_BANDS, S)."""
-    arrival_rad = np.arcsin(np.clip(mirror.arrival_up, -1.0, 1.0))
-    direct_dbic = pattern.gain_at_dbic(np.arcsin(np.clip(towards[..., 2], -1.0, 1.0)))
-    same = 10.0 ** (0.05 * (pattern.gain_at_dbic(arrival_rad) - direct_dbic))
-    other = 10.0 ** (0.05 * (pattern.cross_at_dbic(arrival_rad) - direct_dbic))
-    amplitude = np.zeros((same.shape[0], N_BANDS, same.shape[1]), dtype=np.complex128)
-    for band in _BANDS:
-        right, left = material.reflection(mirror.sine, float(FREQUENCY_HZ[band]))
-        amplitude[:, band] = right * same + left * other
-    return amplitude
+def _free(planes: _Planes, plane: IndexArray, start: FloatArray, point: FloatArray, towards: FloatArray) -> BoolArray:
+    """Whether no facet but the reflecting one is on the ways to the antenna and to the satellite."""
+    way = point - start
+    length = np.sqrt(_dot(way, way))
+    hidden = planes.meet(start, way / length[:, np.newaxis], length) | planes.meet(point, towards, np.inf)
+    hidden[np.arange(plane.size), plane] = False
+    return np.asarray(~hidden.any(axis=-1))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
