@@ -25,6 +25,7 @@ from gbas_bringup.bags import METADATA_FILE, bag_files
 from gbas_bringup.mcap_scan import McapScan, Message
 from gbas_bringup.topic_names import contract_name, is_ephemeris, is_observation, is_progress, split
 from gbas_core.gpstime import calendar_text, epoch_key, from_epoch_key
+from gbas_core.record import Record
 from gbas_msgs_py import topics
 from gbas_msgs_py.events import Event, EventError, EventKind
 from gbas_msgs_py.records import ProtectionEpoch
@@ -264,7 +265,7 @@ class _Contents:
                 self._alerts[event.epoch].append(event)
 
     def _table(self, file: str, topic: str, index: int, decoded: Any, schema: str | None) -> None:
-        record = table_from_msg(decoded)
+        record: Record = table_from_msg(decoded)
         label = decoded.layout.dim[1].label.partition(":")[0]
         if schema is not None and label != schema:
             raise SchemaError(f"has schema {label!r}, expected {schema!r}")

@@ -124,7 +124,7 @@ class Capture:
         with contextlib.ExitStack() as held:
             for subscription in subscriptions:
                 held.enter_context(subscription.handle)
-            context = self._node.context.handle
+            context: Any = self._node.context.handle
             held.enter_context(context)
             waiting = _rclpy.WaitSet(len(subscriptions), 0, 0, 0, 0, 0, context)
             with waiting:

@@ -10,6 +10,7 @@ import itertools
 import re
 import shlex
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -465,7 +466,7 @@ def _print_summary(summary: dict[str, Any], indent: str = "") -> None:
             print(f"{indent}{name}: {f'{value:.3f}' if isinstance(value, float) else value}")
 
 
-def _print_table(title: str, headings: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
+def _print_table(title: str, headings: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:
     from rich.console import Console
     from rich.table import Table
 

@@ -11,6 +11,10 @@ Update = Callable[[int, int | None, str], None]
 """Called with what is done, what is to do (None if nobody knows) and a note."""
 
 
+def _nothing(done: int, total: int | None, note: str) -> None:
+    """An update nobody sees."""
+
+
 def on_terminal() -> bool:
     """Whether a person is watching standard error."""
     return sys.stderr.isatty()
@@ -20,7 +24,7 @@ def on_terminal() -> bool:
 def progress(title: str, *, enabled: bool = True, total: int | None = None) -> Iterator[Update]:
     """Show the progress of some work on standard error; does nothing when it is not a terminal."""
     if not (enabled and on_terminal()):
-        yield lambda _done, _total=None, _note="": None
+        yield _nothing
         return
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn

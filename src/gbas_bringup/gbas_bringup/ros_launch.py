@@ -22,7 +22,7 @@ from gbas_bringup.node_kinds import NODE_KINDS, NodeInstance, Stage
 from gbas_bringup.resources import named_config
 from gbas_bringup.run_config import one_driver, read_run_config
 from gbas_bringup.runs import new_directory
-from launch import LaunchContext, LaunchDescription
+from launch import LaunchContext, LaunchDescription  # type: ignore[attr-defined]  # there without ROS: our folder
 
 _ARGUMENTS = {
     "config": "ROS parameter file, or the name of one that comes with the suite",
