@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import array
+import contextlib
 import math
 from collections.abc import Callable
 from dataclasses import replace
@@ -13,12 +14,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from rclpy.serialization import deserialize_message, serialize_message
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import NavSatFix, NavSatStatus
-from std_msgs.msg import Float64MultiArray, MultiArrayDimension, UInt8MultiArray
+from std_msgs.msg import Float64, Float64MultiArray, MultiArrayDimension, UInt8, UInt8MultiArray
 
 from gbas_core.frames import ecef_from_geodetic
 from gbas_core.observations import ObservationEpoch
-from gbas_msgs_py import ros, tables, topics
+from gbas_msgs_py import cdr, ros, tables, topics
 from gbas_msgs_py.qos import qos_of
 from gbas_msgs_py.records import SolutionEpoch
 from gbas_msgs_py.schema import SchemaError
@@ -111,6 +113,66 @@ def test_without_a_schema_any_registered_table_is_read() -> None:
 def test_burst_round_trip(week: int, half_seconds: int, slot: int, in_frame: int, payload: bytes) -> None:
     burst = Burst(gps_week=week, tow_s=half_seconds / 2, slot=slot, bursts_in_frame=in_frame, payload=payload)
     assert ros.burst_from_msg(over_the_air(ros.burst_to_msg(burst))) == burst
+
+
+@given(satellites=st.sets(st.integers(0, 67)), simulated=st.floats(allow_infinity=False))
+def test_prepared_bytes_are_what_the_middleware_reads_and_writes(satellites: set[int], simulated: float) -> None:
+    """Second formulation: rclpy's own serialisation, both ways."""
+    sent = ObservationEpoch(gps_week=2300, tow_s=1000.5, simulated=simulated)
+    sent.code_m[:, list(satellites)] = 2.1e7
+    codec, table = cdr.TableCodec(tables.OBSERVATIONS), tables.OBSERVATIONS.encode(sent).tobytes()
+    by_rclpy = deserialize_message(codec.encode(sent), Float64MultiArray)
+    assert by_rclpy.layout == ros.table_to_msg(tables.OBSERVATIONS, sent).layout
+    assert by_rclpy.data.tobytes() == table
+    mine = codec.decode(serialize_message(ros.table_to_msg(tables.OBSERVATIONS, sent)))
+    assert mine is not None
+    assert tables.OBSERVATIONS.encode(mine).tobytes() == table
+
+
+@given(slot=st.integers(0, 7), in_frame=st.integers(1, 8), payload=st.binary(max_size=228))
+def test_prepared_bursts_are_what_the_middleware_reads_and_writes(slot: int, in_frame: int, payload: bytes) -> None:
+    burst = Burst(gps_week=2300, tow_s=1.5, slot=slot, bursts_in_frame=in_frame, payload=payload)
+    assert deserialize_message(cdr.encode_burst(burst), UInt8MultiArray) == ros.burst_to_msg(burst)
+    assert cdr.decode_burst(serialize_message(ros.burst_to_msg(burst))) == burst
+
+
+@given(
+    value=st.floats(allow_nan=False),
+    small=st.integers(0, 255),
+    week=st.integers(0, 3000),
+    tow_ms=st.integers(0, 604_799_999),
+)
+def test_prepared_scalars_are_what_the_middleware_reads(value: float, small: int, week: int, tow_ms: int) -> None:
+    assert deserialize_message(cdr.encode_float(value), Float64).data == value
+    assert deserialize_message(cdr.encode_uint8(small), UInt8).data == small
+    clock = deserialize_message(cdr.encode_clock(week, tow_ms / 1000.0), Clock).clock
+    assert clock == ros.stamp_of(week, tow_ms / 1000.0)
+
+
+def _without_label(message: Any) -> None:
+    message.layout.dim[0].label = "row"
+
+
+@pytest.mark.parametrize("change", [_without_label, _shorten, _offset, _layout(size0=2), _drop_dimension])
+def test_what_is_laid_out_otherwise_is_left_to_the_general_decoder(change: Callable[[Any], None]) -> None:
+    message = ros.table_to_msg(tables.OBSERVATIONS, observations())
+    change(message)
+    codec, data = cdr.TableCodec(tables.OBSERVATIONS), serialize_message(message)
+    assert codec.decode(data) is None
+    with pytest.raises(SchemaError) as told:
+        ros.table_from_bytes(data, codec)
+    with pytest.raises(SchemaError) as expected:
+        ros.table_from_msg(message, tables.OBSERVATIONS)
+    assert str(told.value) == str(expected.value)
+
+
+@given(data=st.binary(max_size=120), cut=st.integers(0, 500))
+def test_random_bytes_never_do_worse_than_a_schema_error(data: bytes, cut: int) -> None:
+    codec = cdr.TableCodec(tables.OBSERVATIONS)
+    for attempt in (data, codec.encode(observations())[:cut] + data):
+        for decode in (lambda each: ros.table_from_bytes(each, codec), ros.burst_from_bytes):
+            with contextlib.suppress(SchemaError):
+                decode(attempt)
 
 
 def test_empty_frame_round_trip() -> None:

@@ -58,6 +58,8 @@ STATUS_WARN: Final = DiagnosticStatus.WARN
 STATUS_ERROR: Final = DiagnosticStatus.ERROR
 STATUS_STALE: Final = DiagnosticStatus.STALE
 REPORT_PERIOD_S: Final = 1.0
+PROBLEM_REPORT_S: Final = 0.1
+"""A problem is reported this soon, not only with the next regular report."""
 _PROGRESS: Final = TableCodec(PROGRESS)
 _POLL_S: Final = 0.1
 _GATE_POLL_S: Final = 0.01
@@ -296,6 +298,7 @@ class GbasNode(Node):
     def problem(self, kind: str, detail: str = "") -> None:
         """Count something that went wrong without ending the node; diagnostics and the log show it."""
         self.problems[kind] += 1
+        self._report_due_s = min(self._report_due_s, time.monotonic() + PROBLEM_REPORT_S)
         self.last_problem = f"{kind}: {detail}" if detail else kind
         self.get_logger().warning(self.last_problem, throttle_duration_sec=1.0)
 
