@@ -30,15 +30,7 @@ _LOWEST_RAD: Final = np.radians(12.0)
 _STEPS: Final = 32
 # Spreads the satellites over the places that are high enough.
 _GOLDEN: Final = 0.5 * (np.sqrt(5.0) - 1.0)
-_TURNED: Final = ("omega0_rad", "m0_rad")
-
-
-class CrowdedWorld(World):
-    """A world in which :data:`SATELLITES_A_SYSTEM` GPS and as many Galileo satellites are seen at every epoch."""
-
-    def __init__(self, params: WorldParams) -> None:
-        ephemeris = crowded(open_orbits(params).received[0], params)
-        super().__init__(params, orbits=Orbits(truth=(ephemeris,), switch_s=(), received=(ephemeris,)))
+_ANGLES: Final = ("omega0_rad", "m0_rad")
 
 
 def bench_config() -> Path:
@@ -46,12 +38,18 @@ def bench_config() -> Path:
     return config_path(CONFIG)
 
 
-def bench_world() -> CrowdedWorld:
+def bench_world() -> World:
     """The world of the benchmark's configuration."""
-    return CrowdedWorld(scenario_from_yaml(bench_config()))
+    return crowded(scenario_from_yaml(bench_config()))
 
 
-def crowded(nominal: Ephemeris, params: WorldParams) -> Ephemeris:
+def crowded(params: WorldParams) -> World:
+    """A world in which :data:`SATELLITES_A_SYSTEM` GPS and as many Galileo satellites are seen at every epoch."""
+    turned = _turned(open_orbits(params).received[0], params)
+    return World(params, orbits=Orbits(truth=(turned,), switch_s=(), received=(turned,)))
+
+
+def _turned(nominal: Ephemeris, params: WorldParams) -> Ephemeris:
     """Ephemerides of the satellites kept, each turned to where it is high at all times of the run."""
     kept = np.zeros(N_SATS, dtype=bool)
     kept[:SATELLITES_A_SYSTEM] = kept[N_GPS : N_GPS + SATELLITES_A_SYSTEM] = True
@@ -63,7 +61,7 @@ def crowded(nominal: Ephemeris, params: WorldParams) -> Ephemeris:
     for number, satellite in enumerate(np.flatnonzero(kept)):
         places = np.flatnonzero(high[:, satellite])
         choice[satellite] = places[int(len(places) * (number * _GOLDEN % 1.0))]
-    angles = {name: _half_turn(getattr(turned, name)[choice, np.arange(N_SATS)]) for name in _TURNED}
+    angles = {name: _half_turn(getattr(turned, name)[choice, np.arange(N_SATS)]) for name in _ANGLES}
     placed = _with(nominal, **angles)
     return _with(placed, **{name: np.where(kept, value, np.nan) for name, value in _arrays(placed).items()})
 

@@ -160,9 +160,9 @@ def _remap(text: str) -> str:
 def launch_list(as_json: Json = False) -> None:
     """List the configurations that come with the suite, the launch files, and the nodes."""
     from gbas_bringup.node_kinds import NODE_KINDS
-    from gbas_bringup.resources import resources
+    from gbas_bringup.resources import configurations, resources
 
-    paths = [path for path in resources("config", "*.yaml") if _can_run(path)]
+    paths = [path for path in configurations() if _can_run(path)]
     configs = {path.stem: _first_sentence(path) for path in paths}
     launches = [path.name for path in resources("launch", "*.launch.py")]
     nodes = {name: kind.module for name, kind in NODE_KINDS.items()}

@@ -22,7 +22,7 @@ def config_path(name: str) -> Path:
 
 
 def named_config(name: str) -> Path:
-    """A configuration file by its path, or one of ``config/`` by its name with or without ``.yaml``.
+    """A configuration file by its path, or one of :func:`configurations` by its name with or without ``.yaml``.
 
     Raises
     ------
@@ -32,10 +32,15 @@ def named_config(name: str) -> Path:
     path = Path(name)
     if path.is_file() or len(path.parts) > 1:
         return path
-    known = {each.stem: each for each in resources("config", "*.yaml")}
+    known = {each.stem: each for each in configurations()}
     if path.name.removesuffix(".yaml") in known:
         return known[path.name.removesuffix(".yaml")]
     raise ConfigError(name, f"there is no such file, and it is none of {', '.join(sorted(known))}")
+
+
+def configurations() -> tuple[Path, ...]:
+    """Files of ``config/`` and ``config/scenarios/``."""
+    return (*resources("config", "*.yaml"), *resources("config/scenarios", "*.yaml"))
 
 
 def resources(folder: str, pattern: str) -> tuple[Path, ...]:

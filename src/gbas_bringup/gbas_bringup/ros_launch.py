@@ -70,9 +70,10 @@ def _plan(context: LaunchContext, *, play: bool) -> RunPlan:
     config = read_run_config(path).with_nodes(
         driver=_PLAYER if play else None, recorder=given["record"].lower() in ("true", "1", "yes")
     )
+    directory = Path(given["out"]) if given["out"] else new_directory(Path("out"), path.stem)
     return RunPlan(
-        config=config,
-        directory=Path(given["out"]) if given["out"] else new_directory(Path("out"), path.stem),
+        config=config.written(directory),
+        directory=directory,
         speed=None if given["speed"] == "configured" else speed_of(given["speed"]),
         overrides={_PLAYER.full_name: {"bag": given["bag"]}} if play else {},
         command=f"ros2 launch gbas_bringup, with {given}",

@@ -4,11 +4,15 @@ Every section that names a node of the suite starts it: ``/gbas/positioning`` in
 ``/gbas/second/positioning`` as that of a second aircraft. Beside these, parameters for all (``/**``) start what they
 are for: ``ground`` the ground station, ``airborne`` the receiver, ``sim`` the simulator. The recorder is added by
 whoever runs the file.
+
+A file with ``base: FILE`` beside its sections holds only what differs from that file, which is looked for beside it.
+ROS does not know this: a run writes the whole of it into its folder, and its nodes read that.
 """
 
 from __future__ import annotations
 
 import difflib
+import itertools
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,6 +23,7 @@ import yaml
 from gbas_bringup.errors import ConfigError
 from gbas_bringup.node_kinds import NODE_KINDS, NodeInstance, Stage
 from gbas_msgs_py.topics import DEFAULT_NAMESPACE
+from gbas_sim.scenario import ScenarioError, read_document
 
 _PARAMETERS: Final = "ros__parameters"
 _ALL: Final = "/**"
@@ -35,11 +40,23 @@ class RunConfig:
         In order of their stages.
     parameters : mapping of str to mapping
         Parameters by full node name; those for all under ``"/**"``.
+    whole : str
+        Text of the file with what it is based on, when it is; empty otherwise.
     """
 
     path: Path
     nodes: tuple[NodeInstance, ...]
     parameters: Mapping[str, Mapping[str, Any]]
+    whole: str = ""
+
+    def written(self, directory: Path) -> RunConfig:
+        """The same with everything in one ROS parameter file: in the folder, if it is not so already."""
+        if not self.whole:
+            return self
+        directory.mkdir(parents=True, exist_ok=True)
+        path = directory / self.path.name
+        path.write_text(self.whole, encoding="utf-8")
+        return replace(self, path=path, whole="")
 
     @property
     def drivers(self) -> tuple[NodeInstance, ...]:
@@ -57,8 +74,20 @@ class RunConfig:
 
     def given(self, node: NodeInstance, name: str) -> bool:
         """Whether the file sets a parameter of a node."""
-        candidates = (_ALL, node.full_name, f"/**/{node.kind.name}")
-        return any(name in self.parameters.get(section, {}) for section in candidates)
+        return self.value(node, name) is not None
+
+    def value(self, node: NodeInstance, name: str) -> Any:
+        """What the file sets a parameter of a node to; None if it does not."""
+        for section in (node.full_name, f"/**/{node.kind.name}", _ALL):
+            if name in self.parameters.get(section, {}):
+                return self.parameters[section][name]
+        return None
+
+    @property
+    def files(self) -> dict[str, str]:
+        """Further configuration files that nodes read (their parameter ``config``), by full node name."""
+        named = {node.full_name: self.value(node, "config") for node in self.nodes}
+        return {name: file for name, file in named.items() if isinstance(file, str) and file}
 
 
 def read_run_config(path: Path) -> RunConfig:
@@ -69,7 +98,12 @@ def read_run_config(path: Path) -> RunConfig:
     ConfigError
         When it cannot be read, is not a ROS parameter file, names an unknown node, or has not one driver of time.
     """
-    parameters = dict(_sections(_load(path), path))
+    document = _load(path)
+    whole = ""
+    if "base" in document:
+        document = _with_base(path)
+        whole = _heading(path) + yaml.safe_dump(document, sort_keys=False, width=120)
+    parameters = dict(_sections(document, path))
     nodes = {node.full_name: node for node in _named(parameters, path)}
     for node in _implied(parameters, has_driver=any(n.kind.stage is Stage.DRIVER for n in nodes.values())):
         if not any(known.kind == node.kind for known in nodes.values()):
@@ -78,7 +112,7 @@ def read_run_config(path: Path) -> RunConfig:
     if not ordered:
         known = ", ".join(f"{DEFAULT_NAMESPACE}/{name}" for name in NODE_KINDS)
         raise ConfigError(path, f"starts no node; sections may be ground, airborne, sim, or one of {known}")
-    return RunConfig(path=path, nodes=ordered, parameters=parameters)
+    return RunConfig(path=path, nodes=ordered, parameters=parameters, whole=whole)
 
 
 def one_driver(config: RunConfig) -> NodeInstance:
@@ -108,6 +142,22 @@ def _load(path: Path) -> Mapping[str, Any]:
     if not isinstance(document, Mapping):
         raise ConfigError(path, f"is no ROS parameter file: a {type(document).__name__}, expected node names")
     return document
+
+
+def _with_base(path: Path) -> Mapping[str, Any]:
+    try:
+        document, _ = read_document(path)
+    except ScenarioError as error:
+        raise ConfigError(path, str(error).removeprefix(f"{path}: ")) from error
+    if not isinstance(document, Mapping):
+        raise ConfigError(path, "is not based on a ROS parameter file")
+    return document
+
+
+def _heading(path: Path) -> str:
+    """Comment at the head of a configuration file, and where it comes from."""
+    head = itertools.takewhile(lambda line: line.startswith("#"), path.read_text(encoding="utf-8").splitlines())
+    return "\n".join([*head, f"# Written from {path.name} and what it is based on."]) + "\n"
 
 
 def _one_line(error: yaml.YAMLError) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from gbas_bringup.environment import process_environment
@@ -37,6 +38,7 @@ def execute(
     """
     if plan.bag_path.exists() and any(node.kind.name == "recorder" for node in plan.config.nodes):
         raise BagError(plan.bag_path, "already exists; a recording never overwrites anything, choose another folder")
+    plan = replace(plan, config=plan.config.written(plan.directory))
     environment = process_environment(domain=plan.domain, isolated=plan.isolated)
     with progress(title, enabled=not (quiet or verbose), total=total) as update, Monitor(environment) as monitor:
         driver = plan.config.drivers[0].kind.name

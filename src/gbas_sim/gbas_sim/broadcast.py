@@ -172,7 +172,8 @@ def recorded_orbits(
     centres = [RENEWAL_S * each for each in range(first, round((start_s + duration_s) / RENEWAL_S) + 1)]
     truth = tuple(_nearest(navigation, centre_s, systems) for centre_s in centres)
     last_key = epoch_key(gps_week, tow_s) + round(duration_s * 1000.0)
-    received = [each for each in navigation.received(gps_week, tow_s) if epoch_key(each.gps_week, each.tow_s) <= last_key]
+    heard = navigation.received(gps_week, tow_s)
+    received = [each for each in heard if epoch_key(each.gps_week, each.tow_s) <= last_key]
     return Orbits(
         truth=truth,
         switch_s=tuple(centre_s + 0.5 * RENEWAL_S for centre_s in centres[:-1]),

@@ -10,7 +10,7 @@ import math
 import types
 import typing
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import fields, is_dataclass
 from typing import Any, Literal, TypeVar
 
 R = TypeVar("R")
@@ -24,7 +24,7 @@ def record_from_keys(kind: type[R], section: Mapping[str, Any], path: str, **giv
     kind : type
         Frozen dataclass whose fields are numbers, texts, flags, and tuples of these.
     section : mapping
-        Keys without sections in them.
+        Keys; those of records within records are dotted.
     path : str
         Of the section, with a dot at its end, for messages.
     given
@@ -37,8 +37,12 @@ def record_from_keys(kind: type[R], section: Mapping[str, Any], path: str, **giv
     """
     hints = typing.get_type_hints(kind)
     names = {in_files(item.name): item.name for item in fields(kind) if item.name not in given}  # type: ignore[arg-type]
-    values = dict(given)
+    values, inner = dict(given), _inner(section, hints)
+    for name, keys in inner.items():
+        values[name] = record_from_keys(hints[name], keys, f"{path}{name}.")
     for key, value in section.items():
+        if key.partition(".")[0] in inner:
+            continue
         if key not in names:
             raise ValueError(f"{path}{key} is unknown; known are {', '.join(sorted(names))}")
         values[names[key]] = _converted(f"{path}{key}", value, hints[names[key]], degrees=key != names[key])
@@ -46,6 +50,16 @@ def record_from_keys(kind: type[R], section: Mapping[str, Any], path: str, **giv
         return kind(**values)
     except (TypeError, ValueError) as error:
         raise ValueError(f"{path.removesuffix('.')}: {_plain(error)}") from None
+
+
+def _inner(section: Mapping[str, Any], hints: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Keys of records within the record, by the field they are in."""
+    found: dict[str, dict[str, Any]] = {}
+    for key, value in section.items():
+        first, dot, rest = key.partition(".")
+        if dot and is_dataclass(hints.get(first)):
+            found.setdefault(first, {})[rest] = value
+    return found
 
 
 def keys_of(record: Any, prefix: str, *, leave_out: tuple[str, ...] = ()) -> dict[str, Any]:

@@ -3,7 +3,8 @@
 The reference receivers' antennas, the station's place, the final approach and the troposphere are the site's
 (``ground.receivers``, ``ground.station``, ``ground.approaches``, ``ground.atmosphere``): the world is as the station
 says, unless it is told to differ. A file may say ``base: FILE`` beside its sections: it then holds only what differs
-from that file, which is looked for beside it. Everything under ``sim`` may be left out::
+from that file, which is looked for beside it; a key without a value takes the file's away. Everything under ``sim`` may
+be left out::
 
     sim:
       systems: "GE"
@@ -35,6 +36,7 @@ Angles are degrees in files only.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Mapping
 from dataclasses import replace
@@ -48,6 +50,7 @@ from gbas_core.approach import FinalApproach
 from gbas_core.approach_keys import approach_from_mapping
 from gbas_core.frames import ecef_from_geodetic
 from gbas_core.rinex import RinexError
+from gbas_sim.faults import RECEIVER_FAULTS, SATELLITE_FAULTS
 from gbas_sim.flight import StraightIn
 from gbas_sim.flight_dynamics import flight_from_mapping
 from gbas_sim.fronts import PlasmaBubble, WedgeFront
@@ -82,6 +85,7 @@ THREATS: Final[dict[str, tuple[type[Any], str]]] = {
     "front": (WedgeFront, "fronts"),
     "bubble": (PlasmaBubble, "fronts"),
     "weather": (WeatherBox, "weather"),
+    **{kind: (made, "faults") for kind, made in (SATELLITE_FAULTS | RECEIVER_FAULTS).items()},
 }
 """Class of each kind of threat, and the field of :class:`~gbas_sim.world.WorldParams` it goes to."""
 _BASE: Final = "base"
@@ -139,17 +143,14 @@ def read_document(path: str | Path) -> tuple[Any, tuple[Path, ...]]:
     ScenarioError
         When a file cannot be read or is not YAML, or files are based on each other.
     """
-    read: list[Path] = []
-    document, place = None, Path(path)
+    read, layers, place = [], [], Path(path)
     while True:
         own = _load(place)
         read.append(place)
         base = own.get(_BASE) if isinstance(own, Mapping) else None
-        if base is not None:
-            own = {key: value for key, value in own.items() if key != _BASE}
-        document = own if document is None else _merged(own, document)
+        layers.append(own if base is None else {key: value for key, value in own.items() if key != _BASE})
         if base is None:
-            return document, tuple(read)
+            return functools.reduce(_merged, reversed(layers)), tuple(read)
         if not isinstance(base, str) or len(read) > _MOST_BASES:
             raise ScenarioError(f"{place}: {_BASE} = {base!r} is not a file, or files are based on each other")
         place = place.parent / base
@@ -165,13 +166,13 @@ def _load(path: Path) -> Any:
 
 
 def _merged(below: Any, above: Any) -> Any:
-    """Sections of two documents; where both have a value, that of the second."""
+    """Sections of two documents; where both have a value, that of the second, and nothing where it has none."""
     if not (isinstance(below, Mapping) and isinstance(above, Mapping)):
         return above
     both = dict(below)
     for key, value in above.items():
         both[key] = _merged(both[key], value) if key in both else value
-    return both
+    return {key: value for key, value in both.items() if value is not None}
 
 
 def read_sections(path: str | Path) -> Mapping[str, Any]:

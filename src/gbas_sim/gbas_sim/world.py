@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Final, Protocol
+from typing import Any, Final, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,9 +20,25 @@ from gbas_core.gpstime import epoch_key, from_epoch_key
 from gbas_core.observations import ObservationEpoch
 from gbas_core.orbits import SatelliteState, group_delay_s
 from gbas_core.record import FloatArray
-from gbas_core.satellites import N_SATS, satellites_of
+from gbas_core.satellites import N_SATS, SAT_INDEX, satellites_of
 from gbas_core.signals import L2, N_BANDS
 from gbas_sim.broadcast import Arc, Orbits, almanac_orbits, nominal_orbits, recorded_orbits
+from gbas_sim.faults import (
+    RECEIVERS,
+    FrozenOutput,
+    Listener,
+    Moment,
+    OrbitFault,
+    ReceiverFault,
+    SatelliteFault,
+    SignalEffect,
+    clock_jumps_s,
+    displaced,
+    receiver_effect,
+    signal_effect,
+    source_epochs,
+    with_wrong_broadcasts,
+)
 from gbas_sim.fronts import PlasmaBubble, WedgeFront
 from gbas_sim.ionosphere import Ionosphere, IonosphereParams
 from gbas_sim.oscillators import ClockState
@@ -39,7 +55,7 @@ AIRCRAFT_NUMBER: Final = 100
 LONGEST_S: Final = 7.0 * 86_400.0
 _EARTH_SURFACE_M: Final = (6.3e6, 6.5e6)
 _FARTHEST_M: Final = 20_000.0
-_INSTANTS_KEPT: Final = 3
+_INSTANTS_KEPT: Final = 6
 
 
 class FlightPath(Protocol):
@@ -76,6 +92,7 @@ class WorldParams:
     fronts : tuple of WedgeFront or PlasmaBubble
     scintillation : ScintillationParams, optional
         None is none.
+    faults : tuple of SatelliteFault or ReceiverFault
     ground, airborne : ReceiverParams or ReceiverModel
     systems : str
         ``"G"``, ``"E"`` or ``"GE"``.
@@ -100,6 +117,7 @@ class WorldParams:
     ionosphere: IonosphereParams | None = None
     fronts: tuple[WedgeFront | PlasmaBubble, ...] = ()
     scintillation: ScintillationParams | None = None
+    faults: tuple[SatelliteFault | ReceiverFault, ...] = ()
     ground: ReceiverParams | ReceiverModel = GROUND_RECEIVER
     airborne: ReceiverParams | ReceiverModel = AIRBORNE_RECEIVER
     systems: str = "GE"
@@ -148,6 +166,12 @@ class WorldParams:
                     f"world: receiver_ecef_m of receiver {number} is {away_m:.0f} m from the station, more than "
                     f"{_FARTHEST_M:.0f}"
                 )
+
+    @property
+    def receiver_names(self) -> tuple[str, ...]:
+        """Names of the receivers, as in :data:`gbas_sim.faults.RECEIVERS`; the aircraft's last."""
+        ground = RECEIVERS[: len(self.receiver_ecef_m)]
+        return ground if self.flight is None else (*ground, RECEIVERS[-1])
 
     @property
     def station(self) -> Station:
@@ -229,6 +253,7 @@ class _Instant:
     elevation_rad: FloatArray
     cn0_dbhz: FloatArray
     tracked: NDArray[np.bool_]
+    effect: SignalEffect | None
 
 
 def open_orbits(params: WorldParams) -> Orbits:
@@ -268,7 +293,11 @@ class World:
     def __init__(self, params: WorldParams, *, orbits: Orbits | None = None) -> None:
         self.params = params
         self.orbits = open_orbits(params) if orbits is None else orbits
-        self.ephemerides: tuple[Ephemeris, ...] = self.orbits.received
+        self._satellite_faults = [fault for fault in params.faults if isinstance(fault, SatelliteFault)]
+        self._receiver_faults = [fault for fault in params.faults if isinstance(fault, ReceiverFault)]
+        self.ephemerides: tuple[Ephemeris, ...] = with_wrong_broadcasts(
+            self.orbits.received, self._satellite_faults, params.start_week, params.start_tow_s
+        )
         self._start_key = epoch_key(params.start_week, params.start_tow_s)
         self._interval_ms = round(params.interval_s * 1000.0)
         self._sites_m = np.array(params.receiver_ecef_m, dtype=np.float64)
@@ -286,6 +315,9 @@ class World:
             None if params.scintillation is None else Scintillation(params=params.scintillation, seed=params.seed)
         )
         self._instants: dict[int, _Instant] = {}
+        kinds = (*(params.ground for _ in numbers), *(() if params.flight is None else (params.airborne,)))
+        self._listeners = tuple(_listener(*each) for each in zip(params.receiver_names, kinds, strict=True))
+        check_threats(self)
 
     @property
     def ephemeris(self) -> Ephemeris:
@@ -308,6 +340,21 @@ class World:
         """
         if not 0 <= number < len(self):
             raise IndexError(f"epoch {number} is not within 0 to {len(self) - 1}")
+        now = self._instant(number)
+        observations = self._with_frozen(number, self._observations(number))
+        count, truth = len(self._sites_m), None
+        if self.params.flight is not None:
+            position_m, velocity_mps = now.paths.position_m[-1], now.paths.velocity_mps[-1]
+            truth = Truth(gps_week=now.gps_week, tow_s=now.tow_s, position_m=position_m, velocity_mps=velocity_mps)
+        return SimulatedEpoch(
+            key=epoch_key(now.gps_week, now.tow_s),
+            ground=observations[:count],
+            airborne=observations[count] if len(observations) > count else None,
+            truth=truth,
+        )
+
+    def _observations(self, number: int) -> tuple[ObservationEpoch, ...]:
+        """What receivers would observe that are not frozen."""
         before, now = self._instant(number - 1), self._instant(number)
         arrivals = self._arrivals(now, before.tracked)
         observations: list[ObservationEpoch] = []
@@ -320,13 +367,19 @@ class World:
                 group_delay_s=self._group_delay_s,
                 seen=_of(arrivals, rows),
             )
-        key, count = epoch_key(now.gps_week, now.tow_s), len(self._sites_m)
-        truth = None
-        if self.params.flight is not None:
-            position_m, velocity_mps = now.paths.position_m[-1], now.paths.velocity_mps[-1]
-            truth = Truth(gps_week=now.gps_week, tow_s=now.tow_s, position_m=position_m, velocity_mps=velocity_mps)
-        airborne = observations[count] if len(observations) > count else None
-        return SimulatedEpoch(key=key, ground=tuple(observations[:count]), airborne=airborne, truth=truth)
+        return tuple(observations)
+
+    def _with_frozen(self, number: int, observations: tuple[ObservationEpoch, ...]) -> tuple[ObservationEpoch, ...]:
+        """Observations with those of earlier epochs where outputs are frozen."""
+        if not any(isinstance(fault, FrozenOutput) for fault in self._receiver_faults):
+            return observations
+        sources = source_epochs(self._receiver_faults, self._moment(number), number)
+        mixed = list(observations)
+        for source in sorted(set(sources[sources != number].tolist())):
+            earlier = self._observations(source) if source >= 0 else None
+            for row in np.flatnonzero((sources == source).any(axis=1)):
+                mixed[row] = _mixed(mixed[row], None if earlier is None else earlier[row], sources[row] == source)
+        return tuple(mixed)
 
     def elevations_rad(self, number: int) -> FloatArray:
         """Elevations ``(R, N_SATS)`` of the satellites at an epoch, the aircraft's last [rad]."""
@@ -345,11 +398,15 @@ class World:
         since_s = 0.001 * (number * self._interval_ms)
         clocks = [bank.errors.clocks(number) for bank in self._banks]
         clock = ClockState(*(np.concatenate(parts) for parts in zip(*clocks, strict=True)))
-        arc = self.orbits.arc(week, tow_s)
+        if self._receiver_faults:
+            jump_s = clock_jumps_s(self._receiver_faults, self._moment(number))
+            clock = clock._replace(offset_s=clock.offset_s + jump_s)
+        arc = self._arc(week, tow_s, since_s)
         seen = sky(arc, np.array(tow_s))
         paths = self._paths(week, tow_s, since_s, clock, seen)
         elevation = np.arcsin(np.clip(paths.sin_elevation, -1.0, 1.0))
-        change_db, held = self._disturbed(paths)
+        effect = self._effect(number)
+        change_db, held = self._disturbed(paths, effect)
         cn0, tracked = [], []
         for bank, rows in zip(self._banks, self._rows, strict=True):
             cn0.append(bank.errors.cn0_dbhz(elevation[rows], change_db=change_db[rows]))
@@ -364,7 +421,37 @@ class World:
             elevation_rad=elevation,
             cn0_dbhz=np.concatenate(cn0),
             tracked=np.concatenate(tracked),
+            effect=effect,
         )
+
+    def _arc(self, week: int, tow_s: float, since_s: float) -> Arc:
+        """Orbits around a time, with those that have left what they broadcast."""
+        arc = self.orbits.arc(week, tow_s)
+        faults = [fault for fault in self._satellite_faults if isinstance(fault, OrbitFault)]
+        if not faults:
+            return arc
+
+        def faulty(times_s: FloatArray) -> SatelliteState:
+            state = arc(times_s)
+            return displaced(state, faults, np.broadcast_to(times_s - (tow_s - since_s), state.clock_s.shape))
+
+        return faulty
+
+    def _moment(self, number: int) -> Moment:
+        """An epoch as faults see it: by its time tag, whatever the receivers' clocks are."""
+        since_s = np.full(len(self._listeners), 0.001 * (number * self._interval_ms))
+        return Moment(since_s, self.params.interval_s, self._listeners)
+
+    def _effect(self, number: int) -> SignalEffect | None:
+        """What faults do to the signals; None is nothing."""
+        if not self.params.faults:
+            return None
+        moment = self._moment(number)
+        effect = signal_effect(self._satellite_faults, moment.since_s, moment.listeners, moment.interval_s)
+        if self._receiver_faults:
+            own = receiver_effect(self._receiver_faults, moment, epoch=number, seed=self.params.seed)
+            effect = effect.plus(own)
+        return effect
 
     def _paths(self, week: int, tow_s: float, since_s: float, clock: ClockState, seen: SatelliteState) -> SignalPaths:
         """Receivers and satellites at the instant; the aircraft is where it is when its clock says so."""
@@ -384,7 +471,7 @@ class World:
             satellite_mps=seen.velocity_mps,
         )
 
-    def _disturbed(self, paths: SignalPaths) -> tuple[FloatArray, NDArray[np.bool_]]:
+    def _disturbed(self, paths: SignalPaths, effect: SignalEffect | None) -> tuple[FloatArray, NDArray[np.bool_]]:
         """Change of C/N0 [dB] and signals that can be held, ``(R, N_BANDS, N_SATS)`` each."""
         shape = (len(self._numbers), N_BANDS, N_SATS)
         change_db, held = np.zeros(shape), np.ones(shape, dtype=bool)
@@ -392,6 +479,9 @@ class World:
             scintillation = self._scintillation.epoch(paths, self._numbers)
             held &= ~scintillation.lost[:, np.newaxis]
             change_db -= np.stack([scintillation.fading_db(band) for band in range(N_BANDS)], axis=1)
+        if effect is not None:
+            held &= effect.tracked
+            change_db += effect.cn0_db
         return change_db, held
 
     def _arrivals(self, now: _Instant, tracked_before: NDArray[np.bool_]) -> Arrivals:
@@ -404,17 +494,73 @@ class World:
         dispersive = Delay(delay_m=nothing, rate_mps=nothing)
         for effect in (*(() if self._ionosphere is None else (self._ionosphere,)), *self.params.fronts):
             dispersive = dispersive + effect.delay(paths)
+        effect = now.effect
         return Arrivals(
             lines=lines.delayed(air.delay_m, air.rate_mps),
             dispersive=dispersive,
-            code_m=0.0,
-            carrier_m=0.0,
-            rate_mps=0.0,
+            code_m=0.0 if effect is None else effect.code_m,
+            carrier_m=0.0 if effect is None else effect.carrier_m,
+            rate_mps=0.0 if effect is None else effect.rate_mps,
             cn0_dbhz=now.cn0_dbhz,
             elevation_rad=now.elevation_rad,
             tracked=now.tracked,
-            tracked_before=tracked_before,
+            tracked_before=tracked_before if effect is None else tracked_before & ~effect.slipped,
         )
+
+
+def _mixed(now: ObservationEpoch, earlier: ObservationEpoch | None, satellites: NDArray[np.bool_]) -> ObservationEpoch:
+    """An epoch with the observations of some satellites from an earlier one, or without them if there is none."""
+    arrays = {name: value for name, value in vars(now).items() if isinstance(value, np.ndarray)}
+    values: dict[str, Any] = {
+        name: np.where(satellites, np.nan if earlier is None else getattr(earlier, name), value)
+        for name, value in arrays.items()
+    }
+    return replace(now, **values)
+
+
+def _listener(name: str, kind: ReceiverParams | ReceiverModel) -> Listener:
+    if isinstance(kind, ReceiverModel):
+        return Listener.of(name, kind.tracking)
+    return Listener(name, (kind.spacing_chips[0], kind.spacing_chips[0], kind.spacing_chips[1]))
+
+
+def check_threats(world: World) -> None:
+    """Refuse what concerns a receiver that is not there, or a satellite that no receiver sees while it lasts.
+
+    Raises
+    ------
+    ValueError
+        Naming the threat and the receiver or satellite.
+    """
+    params = world.params
+    for fault in params.faults:
+        names = (fault.receiver,) if isinstance(fault, ReceiverFault) else getattr(fault, "receivers", ())
+        for name in names:
+            if name not in params.receiver_names:
+                there = ", ".join(params.receiver_names)
+                raise ValueError(f"{fault.owner}: receiver {name!r} is not there; there are {there}")
+        satellites = fault.satellites if isinstance(fault, ReceiverFault) else (fault.satellite,)
+        for satellite in satellites:
+            _check_up(world, fault.owner, satellite, fault.start_s, fault.end_s)
+    for front in params.fronts:
+        for satellite in front.satellites:
+            _check_up(world, "front" if isinstance(front, WedgeFront) else "bubble", satellite, 0.0, math.inf)
+
+
+def _check_up(world: World, owner: str, satellite: str, start_s: float, end_s: float) -> None:
+    """Refuse a satellite that no receiver tracks at any of some forty times of a fault."""
+    params, index = world.params, SAT_INDEX[satellite]
+    first = math.ceil(max(start_s, 0.0) / params.interval_s)
+    last = min(len(world) - 1, math.floor(min(end_s, params.length_s) / params.interval_s))
+    if first > last:
+        raise ValueError(f"{owner}: start_s = {start_s:g} is after the end of the run, {params.length_s:g} s")
+    masks_rad = [params.ground.elevation_mask_rad] * len(params.receiver_ecef_m)
+    masks_rad += [params.airborne.elevation_mask_rad] * (params.flight is not None)
+    for number in range(first, last + 1, max(1, (last - first) // 40)):
+        if bool((world.elevations_rad(number)[:, index] >= masks_rad).any()):
+            return
+    raise ValueError(f"{owner}: satellite = {satellite!r} is not up between {max(start_s, 0.0):g} and "
+                     f"{min(end_s, params.length_s):g} s")  # fmt: skip
 
 
 def _group_delays_s(orbits: Orbits) -> FloatArray:
