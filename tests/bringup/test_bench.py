@@ -15,7 +15,7 @@ from rclpy.serialization import serialize_message
 
 from gbas_bringup.bench import PARTS, print_report, run_bench
 from gbas_bringup.bench_figures import Figure, Part, document, environment
-from gbas_bringup.bench_live import read_arrivals
+from gbas_bringup.bench_live import _settled, read_arrivals
 from gbas_bringup.bench_offline import SETTLE_EPOCHS, make_flight, measure_steps
 from gbas_bringup.bench_peer import measure_process
 from gbas_bringup.bench_world import SATELLITES_A_SYSTEM, bench_world
@@ -95,6 +95,13 @@ def test_arrivals_come_from_the_bag(tmp_path):
     # Half a microsecond: times are doubles of seconds.
     np.testing.assert_allclose(np.ravel(times), [1.001, 1.003, 1.004, 1.011, 1.020], atol=5e-7)
     assert seen.n_messages == 11
+    assert seen.protected.tolist() == [False]
+
+
+def test_a_run_without_protection_levels_is_refused(tmp_path):
+    seen, _ = read_arrivals(_bag(tmp_path / "bag"))
+    with pytest.raises(GbasError, match="0 of 1 epochs have protection levels"):
+        _settled(seen, 0)
 
 
 def test_without_recorded_data_the_part_says_why(tmp_path):

@@ -17,6 +17,7 @@ from typing import Any, Final
 
 import numpy as np
 import yaml
+from numpy.typing import NDArray
 
 from gbas_bringup import epochs
 from gbas_bringup.bags import END_METADATA, BagReader
@@ -33,7 +34,7 @@ from gbas_bringup.resources import config_path
 from gbas_bringup.run_config import RunConfig, read_run_config
 from gbas_core.frames import geodetic_from_ecef
 from gbas_core.record import FloatArray
-from gbas_msgs_py import topics
+from gbas_msgs_py import tables, topics
 
 LATENCY_BOUND_S: Final = 0.050
 SPEED_BOUND: Final = 100.0
@@ -42,6 +43,7 @@ RATE_BOUND: Final = SPEED_BOUND / INTERVAL_S
 BOUND_CORES: Final = 2
 """Cores of the machine the bound of the speed is meant for."""
 _SEGMENTS: Final = 5
+_PROTECTED_PART: Final = 0.95
 _FILE_EPOCHS: Final = 1500
 
 SOURCE: Final = NodeKind(
@@ -51,6 +53,7 @@ _CLOCK_TICKS: Final = os.sysconf("SC_CLK_TCK")
 _GROUND: Final = frozenset(topics.resolve(name) for name in topics.GROUND_OBSERVATIONS)
 _AIRBORNE: Final = topics.resolve(topics.AIRBORNE_OBSERVATIONS)
 _PROTECTION: Final = topics.resolve(topics.AIRBORNE_PROTECTION)
+_VPL: Final = tables.PROTECTION.columns.index("vpl_m")
 _OF_INTEREST: Final = (*sorted(_GROUND), _AIRBORNE, topics.VDB, _PROTECTION)
 
 
@@ -71,6 +74,8 @@ class Arrivals:
         Last burst of the frame.
     protection_s : (n,) array
         Protection levels.
+    protected : (n,) bool array
+        Whether there was a vertical protection level.
     n_bytes : int
         Of all messages, as they travel.
     n_messages : int
@@ -82,6 +87,7 @@ class Arrivals:
     airborne_s: FloatArray
     burst_s: FloatArray
     protection_s: FloatArray
+    protected: NDArray[np.bool_]
     n_bytes: int
     n_messages: int
 
@@ -129,7 +135,8 @@ def measure_latency(directory: Path, *, seconds: float) -> Part:
     epochs_measured = max(round(seconds / INTERVAL_S), 2)
     driver = {"epochs": SETTLE_EPOCHS + epochs_measured, "ahead_epochs": SETTLE_EPOCHS}
     run = run_live(crowded_config(bench_config()), directory, speed=1.0, driver=driver)
-    seen = run.arrivals.of(slice(-epochs_measured + 1, None))  # the first one still stands in the queue of the others
+    # The first one still stands in the queue of those before it.
+    seen = _settled(run.arrivals, -epochs_measured + 1)
     pairs = (
         ("last ground observation to last burst", seen.last_ground_s, seen.burst_s),
         ("airborne observation and burst to protection level",
@@ -147,6 +154,16 @@ def measure_latency(directory: Path, *, seconds: float) -> Part:
         figures=tuple(figures),
         details={"epochs": len(seen.key), "lost": run.lost, "largest_ms": largest_ms},
     )
+
+
+def _settled(arrivals: Arrivals, first: int) -> Arrivals:
+    """The arrivals from an epoch on; refused unless the nodes did all their work there."""
+    seen = arrivals.of(slice(first, None))
+    if not (len(seen.key) and seen.protected.mean() > _PROTECTED_PART):
+        raise GbasError(
+            f"{np.sum(seen.protected)} of {len(seen.key)} epochs have protection levels; nothing to measure"
+        )
+    return seen
 
 
 def _latency(name: str, taken_ms: FloatArray, percent: int) -> Figure:
@@ -191,7 +208,7 @@ _PROCESSOR_ABOUT: Final = (
 
 
 def _speed(run: LiveRun, interval_s: float, settle: int, part: str, what: str) -> Part:
-    seen = run.arrivals.of(slice(settle, None))
+    seen = _settled(run.arrivals, settle)
     marks = np.linspace(0, len(seen.key) - 1, _SEGMENTS + 1).round().astype(int)
     rates = np.diff(marks) / np.diff(seen.protection_s[marks])
     rate = float(np.median(rates))
@@ -276,6 +293,7 @@ def crowded_config(path: Path) -> RunConfig:
 def read_arrivals(bag: Path) -> tuple[Arrivals, int]:
     """Times of arrival from a bag, and how many messages the transport lost."""
     times: dict[str, dict[int, list[float]]] = {name: {} for name in _OF_INTEREST}
+    protected: dict[int, bool] = {}
     n_bytes = n_messages = 0
     reader = BagReader(bag)
     for message in reader.messages():
@@ -285,6 +303,8 @@ def read_arrivals(bag: Path) -> tuple[Arrivals, int]:
         if of_topic is not None:
             key = epochs.epoch_of(message.channel.schema.name, message.data)
             of_topic.setdefault(key or 0, []).append(message.log_time_ns * 1e-9)
+            if message.channel.topic == _PROTECTION:
+                protected[key or 0] = math.isfinite(epochs.table_head(message.data, _VPL + 1)[_VPL])
     ground = [of_topic for name, of_topic in times.items() if name in _GROUND and of_topic]
     whole = set.intersection(
         *(set(each) for each in (*ground, times[_AIRBORNE], times[topics.VDB], times[_PROTECTION]))
@@ -297,6 +317,7 @@ def read_arrivals(bag: Path) -> tuple[Arrivals, int]:
         airborne_s=np.array([times[_AIRBORNE][key][0] for key in keys]),
         burst_s=np.array([max(times[topics.VDB][key]) for key in keys]),
         protection_s=np.array([times[_PROTECTION][key][0] for key in keys]),
+        protected=np.array([protected[key] for key in keys], dtype=bool),
         n_bytes=n_bytes,
         n_messages=n_messages,
     )

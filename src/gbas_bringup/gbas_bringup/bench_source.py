@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from gbas_bringup.bench_world import CrowdedWorld
+from gbas_bringup.bench_world import crowded
 from gbas_msgs_py.node import require, run
 from gbas_msgs_py.pacing import Playback
 from gbas_sim.nodes.simulator import Simulator, SimulatorParams
-from gbas_sim.world import SimulatedEpoch
+from gbas_sim.world import SimulatedEpoch, World
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,14 +41,15 @@ class BenchSource(Simulator):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
-        self.world = CrowdedWorld(self.world.params)
         self._made = [self.world.epoch(number) for number in range(self.params.epochs)]
         ahead = self.params.ahead_epochs
         if ahead:
             self._playback = _PacedFrom(self.params.speed, self._made[min(ahead, len(self._made) - 1)].key)
 
+    def make_world(self) -> World:
+        return crowded(super().make_world().params)
+
     def epochs(self) -> Iterator[SimulatedEpoch]:
-        super().epochs()
         return iter(self._made)
 
 

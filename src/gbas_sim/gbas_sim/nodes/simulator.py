@@ -61,13 +61,13 @@ class Simulator(DriverNode[SimulatedEpoch]):
     def world(self) -> World:
         """The world of the parameters, made when it is first asked for."""
         if self._world is None:
-            sections, source = self._sections()
-            self._world = open_world(scenario_from_mapping(sections, source=source), source=source)
+            self._world = self.make_world()
         return self._world
 
-    @world.setter
-    def world(self, world: World) -> None:
-        self._world = world
+    def make_world(self) -> World:
+        """A world of the parameters."""
+        sections, source = self._sections()
+        return open_world(scenario_from_mapping(sections, source=source), source=source)
 
     def _sections(self) -> tuple[dict[str, Any], str]:
         config = self.params.config
