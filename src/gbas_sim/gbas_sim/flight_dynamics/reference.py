@@ -23,6 +23,7 @@ from gbas_sim.flight_dynamics.wind import Wind
 
 SPACING_S: Final = 0.1
 """Between samples of the plan, about [s]; a whole number of them makes the flight."""
+_SLOWEST_MPS: Final = 3.0
 LONGEST_S: Final = 4.0 * 3600.0
 """A flight's longest duration [s]: its tables stay below 200 MB."""
 
@@ -89,13 +90,27 @@ def lay_out(plan: FlightPlan, wind: Wind) -> Reference:
         for leg, part, start in zip(legs, np.split(times, cuts), starts, strict=True)
         if part.size
     ]
-    path = Track(**{item.name: np.concatenate([getattr(part, item.name) for part in parts]) for item in fields(Track)})
+    columns = {item.name: np.concatenate([getattr(part, item.name) for part in parts]) for item in fields(Track)}
+    path = Track(**(columns | {"lon_rad": np.unwrap(columns["lon_rad"])}))
     phases = tuple(
         Phase(kind=segment.kind, start_s=start, end_s=end)
         for segment, start, end in zip(plan.segments, starts, ends, strict=True)
     )
+    _check_ground_speed(path, times, phases)
     rates = CubicSpline(times, path.ground_enu_mps, axis=0)(times, 1)
     return Reference(time_s=times, path=path, ground_rate_mps2=rates, phases=phases)
+
+
+def _check_ground_speed(path: Track, time_s: FloatArray, phases: tuple[Phase, ...]) -> None:
+    """Raise ValueError when the wind stops the aircraft over the ground: then it has no track to be guided along."""
+    speed = np.hypot(path.ground_enu_mps[:, 0], path.ground_enu_mps[:, 1])
+    slowest = int(np.argmin(speed))
+    if not speed[slowest] >= _SLOWEST_MPS:
+        number = next((index for index, phase in enumerate(phases) if time_s[slowest] < phase.end_s), len(phases) - 1)
+        raise ValueError(
+            f"segment {number + 1} ({phases[number].kind}), {time_s[slowest]:.0f} s after the start: in this wind the"
+            f" ground speed is {speed[slowest]:.1f} m/s, less than {_SLOWEST_MPS:g} m/s"
+        )
 
 
 def _legs(plan: FlightPlan, wind: Wind) -> list[Leg]:
