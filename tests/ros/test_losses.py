@@ -207,7 +207,7 @@ def test_replay_names_the_readers_it_misses(launcher: Any, files: dict[str, Any]
 
 def test_replay_says_who_stalls(launcher: Any, probe: Any, files: dict[str, Any]) -> None:
     """A reader that dies in the middle ends the replay with its name, not with a wait for ever."""
-    readers = {"wait_for": [], "stall_s": 10.0, "start_wait_s": 60.0, "window_epochs": 4, "user_file": ""}
+    readers = {"wait_for": [], "stall_s": 5.0, "start_wait_s": 60.0, "window_epochs": 4, "user_file": ""}
     monitor = launcher.start("gbas_ground.nodes.integrity_monitor", {"ground": STATION, "start_wait_s": 60.0})
     launcher.start("gbas_ground.nodes.correction_broadcast", {"ground": STATION, "start_wait_s": 60.0})
     bursts = probe.bursts()
@@ -215,7 +215,7 @@ def test_replay_says_who_stalls(launcher: Any, probe: Any, files: dict[str, Any]
     probe.until(lambda: len(bursts) > 20, "the replay under way")
     monitor.send(signal.SIGKILL)
     assert replay.wait(60.0) == 3
-    assert "no progress of correction_broadcast for 10 s" in replay.output
+    assert "no progress of correction_broadcast for 5 s" in replay.output
 
 
 def test_replay_of_a_station_alone_ends_in_order(launcher: Any, probe: Any, files: dict[str, Any]) -> None:

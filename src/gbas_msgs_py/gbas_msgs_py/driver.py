@@ -6,16 +6,18 @@ readers have finished with the last, says so in a ``finished`` event, and ends w
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Final, Generic, Protocol, TypeVar
 
+from gbas_core.ephemeris import Ephemeris
 from gbas_core.gpstime import epoch_key, from_epoch_key
 from gbas_msgs_py.events import Event, EventKind
+from gbas_msgs_py.joining import ReceptionQueue
 from gbas_msgs_py.node import STATUS_OK, STATUS_STALE, GbasNode, NodeParams, require
 from gbas_msgs_py.pacing import Pacer, Playback
-from gbas_msgs_py.tables import ProgressEpoch
+from gbas_msgs_py.tables import EPHEMERIS, ProgressEpoch
 
 _AT_ONCE_S = 0.0
 _WHILE_WAITING_S = 0.01
@@ -62,6 +64,37 @@ class DrivenEpoch(Protocol):
 
 
 E = TypeVar("E", bound=DrivenEpoch)
+
+
+class EphemerisFeed:
+    """Sends ephemerides a little before the epoch of their reception; readers use them from that epoch on.
+
+    Parameters
+    ----------
+    node : GbasNode
+        The driver.
+    topic : str
+    ephemerides : iterable of Ephemeris
+        In any order.
+    """
+
+    LEAD_MS: Final = 60_000
+    ACK_TIMEOUT_S: Final = 10.0
+
+    def __init__(self, node: GbasNode, topic: str, ephemerides: Iterable[Ephemeris]) -> None:
+        self._node = node
+        self._publisher = node.table_publisher(topic, EPHEMERIS, readers=1)
+        self._queue: ReceptionQueue[Ephemeris] = ReceptionQueue()
+        for each in ephemerides:
+            self._queue.add(epoch_key(each.gps_week, each.tow_s), each)
+
+    def send(self, key: int) -> None:
+        """Send what readers may need up to the epoch `key`, and wait until they have it."""
+        due = self._queue.take(key + self.LEAD_MS)
+        for ephemeris in due:
+            self._publisher.publish(ephemeris)
+        if due and not self._publisher.settled(self.ACK_TIMEOUT_S):
+            self._node.problem("ephemerides not acknowledged", f"within {self.ACK_TIMEOUT_S:g} s")
 
 
 class DriverNode(GbasNode, Generic[E]):

@@ -36,14 +36,17 @@ from rclpy.signals import SignalHandlerOptions
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float64, Float64MultiArray, String, UInt8, UInt8MultiArray
 
+from gbas_core.ephemeris import Ephemeris
+from gbas_core.gpstime import epoch_key
 from gbas_core.record import Record
 from gbas_msgs_py import cdr, ros, topics
 from gbas_msgs_py.cdr import TableCodec
 from gbas_msgs_py.events import Event
+from gbas_msgs_py.joining import ReceptionQueue
 from gbas_msgs_py.parameters import ParameterError, field_types, parameters_from, require, unknown_parameters
 from gbas_msgs_py.qos import qos_of
 from gbas_msgs_py.schema import SchemaError, TableSchema
-from gbas_msgs_py.tables import PROGRESS, ProgressEpoch
+from gbas_msgs_py.tables import EPHEMERIS, PROGRESS, ProgressEpoch
 from gbas_msgs_py.transport import use_profile
 from gbas_msgs_py.vdb.burst import Burst
 
@@ -91,6 +94,36 @@ class NodeParams:
         require("start_wait_s", self.start_wait_s, 0.0 <= self.start_wait_s <= 3600.0, "0 to 3600 s")
         require("recorders", self.recorders, 0 <= self.recorders <= 100, "0 to 100")
         require("silence_s", self.silence_s, 0.0 < self.silence_s <= 3600.0, "more than 0, up to 3600 s")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConfiguredParams(NodeParams):
+    """Parameters of a node whose subject is configured in a file and in ROS parameters over it.
+
+    Attributes
+    ----------
+    config : str
+        The file; none when everything is in ROS parameters.
+    """
+
+    config: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class JoiningParams(ConfiguredParams):
+    """Parameters of a node that joins several inputs by epoch.
+
+    Attributes
+    ----------
+    join_timeout_s : float
+        An epoch is processed without what is still missing this long after its first part arrived [s].
+    """
+
+    join_timeout_s: float = 1.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require("join_timeout_s", self.join_timeout_s, 0.0 < self.join_timeout_s <= 3600.0, "more than 0, up to 3600 s")
 
 
 class TablePublisher(Generic[R]):
@@ -258,6 +291,16 @@ class GbasNode(Node):
         """Call back with each record; with `quiet` they do not count as input whose absence is reported."""
         codec = TableCodec(schema)
         self._subscription(Float64MultiArray, topic, lambda data: ros.table_from_bytes(data, codec), callback, quiet)
+
+    def ephemeris_queue(self) -> ReceptionQueue[Ephemeris]:
+        """Queue that fills with the broadcast ephemerides; each is taken at the epoch of its reception."""
+        queue: ReceptionQueue[Ephemeris] = ReceptionQueue()
+
+        def keep(ephemeris: Ephemeris) -> None:
+            queue.add(epoch_key(ephemeris.gps_week, ephemeris.tow_s), ephemeris)
+
+        self.table_subscription(topics.EPHEMERIS, EPHEMERIS, keep, quiet=True)
+        return queue
 
     def progress_subscription(self, reader: str, callback: Callable[[ProgressEpoch], None]) -> None:
         """Call back when a reader, named by its node or its topic, has finished with an epoch."""

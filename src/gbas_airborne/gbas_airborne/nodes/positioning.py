@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -11,56 +10,31 @@ from sensor_msgs.msg import NavSatFix
 
 from gbas_airborne.nodes.configuration import receiver_params
 from gbas_airborne.receiver import AirborneEpoch, AirborneReceiver, PositionState
-from gbas_core.ephemeris import Ephemeris
 from gbas_core.gpstime import epoch_key, from_epoch_key
 from gbas_core.observations import ObservationEpoch
 from gbas_msgs_py import tables, topics
-from gbas_msgs_py.joining import AirborneInput, AirborneJoiner, ReceptionQueue
-from gbas_msgs_py.node import GbasNode, NodeParams, require, run
+from gbas_msgs_py.joining import AirborneInput, AirborneJoiner
+from gbas_msgs_py.node import GbasNode, JoiningParams, run
 from gbas_msgs_py.ros import fix_from_solution
 from gbas_msgs_py.vdb.burst import Burst
-
-
-@dataclass(frozen=True, kw_only=True)
-class PositioningParams(NodeParams):
-    """Parameters of the node; those of the receiver are in the file and in ``airborne.*``.
-
-    Attributes
-    ----------
-    config : str
-        Receiver file.
-    join_timeout_s : float
-        An observation is processed without the VDB frame it waits for this long after it arrived [s].
-    """
-
-    config: str = ""
-    join_timeout_s: float = 1.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        require("join_timeout_s", self.join_timeout_s, 0.0 < self.join_timeout_s <= 3600.0, "more than 0, up to 3600 s")
 
 
 class Positioning(GbasNode):
     """Joins observations with bursts and runs :meth:`AirborneReceiver.position`."""
 
     def __init__(self, **kwargs: Any) -> None:
-        super().__init__("positioning", PositioningParams, **kwargs)
+        super().__init__("positioning", JoiningParams, **kwargs)
         self.receiver = receiver_params(self, self.params.config)
         self.state = PositionState()
         self.joiner: AirborneJoiner[ObservationEpoch] = AirborneJoiner(
             correction_wait_s=self.receiver.correction_wait_s, timeout_s=self.params.join_timeout_s
         )
-        self.ephemerides: ReceptionQueue[Ephemeris] = ReceptionQueue()
         self.solution = self.table_publisher(topics.AIRBORNE_SOLUTION, tables.SOLUTION, readers=1)
         self.fix = self.message_publisher(NavSatFix, topics.AIRBORNE_FIX)
         self.publish_schemas()
-        self.table_subscription(topics.EPHEMERIS, tables.EPHEMERIS, self.on_ephemeris, quiet=True)
+        self.ephemerides = self.ephemeris_queue()
         self.burst_subscription(topics.VDB, self.on_burst)
         self.table_subscription(topics.AIRBORNE_OBSERVATIONS, tables.OBSERVATIONS, self.on_observations)
-
-    def on_ephemeris(self, ephemeris: Ephemeris) -> None:
-        self.ephemerides.add(epoch_key(ephemeris.gps_week, ephemeris.tow_s), ephemeris)
 
     def on_burst(self, burst: Burst) -> None:
         self.steps(self.joiner.add_burst(burst))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -11,28 +10,15 @@ from gbas_airborne.receiver import AirborneReceiver
 from gbas_airborne.service import ServiceState
 from gbas_msgs_py import tables, topics
 from gbas_msgs_py.events import Event, EventKind
-from gbas_msgs_py.node import GbasNode, NodeParams, run
+from gbas_msgs_py.node import ConfiguredParams, GbasNode, run
 from gbas_msgs_py.records import ServiceType, SolutionEpoch
-
-
-@dataclass(frozen=True, kw_only=True)
-class ProtectionLevelParams(NodeParams):
-    """Parameters of the node; those of the receiver are in the file and in ``airborne.*``.
-
-    Attributes
-    ----------
-    config : str
-        Receiver file.
-    """
-
-    config: str = ""
 
 
 class ProtectionLevel(GbasNode):
     """Runs :meth:`AirborneReceiver.protect`; says that there is no service when solutions cease."""
 
     def __init__(self, **kwargs: Any) -> None:
-        super().__init__("protection_level", ProtectionLevelParams, **kwargs)
+        super().__init__("protection_level", ConfiguredParams, **kwargs)
         self.receiver = receiver_params(self, self.params.config)
         self.state = ServiceState()
         self.service_told = int(ServiceType.NONE)

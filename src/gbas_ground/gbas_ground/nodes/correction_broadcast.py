@@ -2,36 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 from gbas_ground.nodes.configuration import station_params
 from gbas_ground.station import GroundStation, initial_broadcast_state
 from gbas_msgs_py import tables, topics
-from gbas_msgs_py.node import GbasNode, NodeParams, run
+from gbas_msgs_py.node import ConfiguredParams, GbasNode, run
 from gbas_msgs_py.records import IntegrityEpoch
 from gbas_msgs_py.ros import empty_frame
-
-
-@dataclass(frozen=True, kw_only=True)
-class CorrectionBroadcastParams(NodeParams):
-    """Parameters of the node; those of the station are in the file and in ``ground.*``.
-
-    Attributes
-    ----------
-    config : str
-        Station file.
-    """
-
-    config: str = ""
 
 
 class CorrectionBroadcast(GbasNode):
     """Runs :meth:`GroundStation.broadcast`; a frame without bursts is announced, so that nobody waits for it."""
 
     def __init__(self, **kwargs: Any) -> None:
-        super().__init__("correction_broadcast", CorrectionBroadcastParams, **kwargs)
+        super().__init__("correction_broadcast", ConfiguredParams, **kwargs)
         self.station = station_params(self, self.params.config)
         self.state = initial_broadcast_state(self.station)
         self.bursts_sent = 0

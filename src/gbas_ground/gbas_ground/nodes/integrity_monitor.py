@@ -3,58 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from gbas_core.ephemeris import Ephemeris
 from gbas_core.gpstime import epoch_key, from_epoch_key
 from gbas_core.observations import ObservationEpoch
 from gbas_ground.nodes.configuration import station_params
 from gbas_ground.station import GroundEpoch, GroundStation, initial_monitor_state
 from gbas_msgs_py import tables, topics
-from gbas_msgs_py.joining import EpochJoiner, JoinedEpoch, ReceptionQueue
-from gbas_msgs_py.node import GbasNode, NodeParams, require, run
-
-
-@dataclass(frozen=True, kw_only=True)
-class IntegrityMonitorParams(NodeParams):
-    """Parameters of the node; those of the station are in the file and in ``ground.*``.
-
-    Attributes
-    ----------
-    config : str
-        Station file.
-    join_timeout_s : float
-        An epoch is processed without the receivers still missing this long after the first delivered it [s].
-    """
-
-    config: str = ""
-    join_timeout_s: float = 1.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        require("join_timeout_s", self.join_timeout_s, 0.0 < self.join_timeout_s <= 3600.0, "more than 0, up to 3600 s")
+from gbas_msgs_py.joining import EpochJoiner, JoinedEpoch
+from gbas_msgs_py.node import GbasNode, JoiningParams, run
 
 
 class IntegrityMonitor(GbasNode):
     """Joins the receivers by epoch and runs :meth:`GroundStation.monitor`."""
 
     def __init__(self, **kwargs: Any) -> None:
-        super().__init__("integrity_monitor", IntegrityMonitorParams, **kwargs)
+        super().__init__("integrity_monitor", JoiningParams, **kwargs)
         self.station = station_params(self, self.params.config)
         self.state = initial_monitor_state(self.station)
         self.receivers = tuple(f"rr{j}" for j in range(1, self.station.n_receivers + 1))
         self.joiner: EpochJoiner[ObservationEpoch] = EpochJoiner(self.receivers, timeout_s=self.params.join_timeout_s)
-        self.ephemerides: ReceptionQueue[Ephemeris] = ReceptionQueue()
         self.integrity = self.table_publisher(topics.GROUND_INTEGRITY, tables.INTEGRITY, readers=1)
         self.publish_schemas()
-        self.table_subscription(topics.EPHEMERIS, tables.EPHEMERIS, self.on_ephemeris, quiet=True)
+        self.ephemerides = self.ephemeris_queue()
         for receiver, topic in zip(self.receivers, topics.GROUND_OBSERVATIONS, strict=False):
             self.table_subscription(topic, tables.OBSERVATIONS, partial(self.on_observations, receiver))
-
-    def on_ephemeris(self, ephemeris: Ephemeris) -> None:
-        self.ephemerides.add(epoch_key(ephemeris.gps_week, ephemeris.tow_s), ephemeris)
 
     def on_observations(self, receiver: str, observations: ObservationEpoch) -> None:
         key = epoch_key(observations.gps_week, observations.tow_s)

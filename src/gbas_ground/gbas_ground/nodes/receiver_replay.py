@@ -8,20 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from gbas_core.ephemeris import Ephemeris
-from gbas_core.gpstime import epoch_key, from_epoch_key
+from gbas_core.gpstime import from_epoch_key
 from gbas_core.observations import ObservationEpoch
 from gbas_core.recording import RecordedEpoch, Recording
 from gbas_core.satellites import SYSTEM_MASKS, satellites_of
 from gbas_msgs_py import tables, topics
-from gbas_msgs_py.driver import DriverNode, DriverParams
-from gbas_msgs_py.joining import ReceptionQueue
-from gbas_msgs_py.node import TablePublisher, require, run
+from gbas_msgs_py.driver import DriverNode, DriverParams, EphemerisFeed
+from gbas_msgs_py.node import require, run
 from gbas_msgs_py.records import MAX_REFERENCE_RECEIVERS
-
-EPHEMERIS_LEAD_S = 60.0
-"""Ephemerides are sent this long before the epoch of their reception; readers use them from that epoch on."""
-ACK_TIMEOUT_S = 10.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,9 +72,9 @@ class ReceiverReplay(DriverNode[RecordedEpoch]):
             user_navigation=files.user_nav_files, galileo=files.galileo,
         )  # fmt: skip
         self.unused = ~satellites_of(files.systems)
-        self.ephemerides = [self._ephemerides(topics.EPHEMERIS, self.recording.ephemerides())]
+        self.feeds = [EphemerisFeed(self, topics.EPHEMERIS, self.recording.ephemerides())]
         if files.user_nav_files:
-            self.ephemerides.append(self._ephemerides(topics.AIRBORNE_EPHEMERIS, self.recording.user_ephemerides()))
+            self.feeds.append(EphemerisFeed(self, topics.AIRBORNE_EPHEMERIS, self.recording.user_ephemerides()))
         self.receivers = [
             self.table_publisher(topic, tables.OBSERVATIONS, readers=1)
             for topic in topics.GROUND_OBSERVATIONS[: len(files.ground_files)]
@@ -103,7 +97,8 @@ class ReceiverReplay(DriverNode[RecordedEpoch]):
         return epoch.user is not None
 
     def send(self, epoch: RecordedEpoch) -> None:
-        self._send_ephemerides(epoch.key + round(EPHEMERIS_LEAD_S * 1000.0))
+        for feed in self.feeds:
+            feed.send(epoch.key)
         week, tow_s = from_epoch_key(epoch.key)
         for publisher, observations in zip(self.receivers, epoch.ground, strict=True):
             publisher.publish(self._sent_part(observations or ObservationEpoch(gps_week=week, tow_s=tow_s)))
@@ -116,22 +111,6 @@ class ReceiverReplay(DriverNode[RecordedEpoch]):
         names = ("code_m", "carrier_m", "doppler_hz", "cn0_dbhz", "lli")
         kept: dict[str, Any] = {name: np.where(self.unused, np.nan, getattr(observations, name)) for name in names}
         return replace(observations, **kept)
-
-    def _ephemerides(
-        self, topic: str, received: tuple[Ephemeris, ...]
-    ) -> tuple[TablePublisher[Ephemeris], ReceptionQueue[Ephemeris]]:
-        queue: ReceptionQueue[Ephemeris] = ReceptionQueue()
-        for each in received:
-            queue.add(epoch_key(each.gps_week, each.tow_s), each)
-        return self.table_publisher(topic, tables.EPHEMERIS, readers=1), queue
-
-    def _send_ephemerides(self, key: int) -> None:
-        for publisher, queue in self.ephemerides:
-            due = queue.take(key)
-            for ephemeris in due:
-                publisher.publish(ephemeris)
-            if due and not publisher.settled(ACK_TIMEOUT_S):
-                self.problem("ephemerides not acknowledged", f"within {ACK_TIMEOUT_S:g} s")
 
 
 def main() -> None:
