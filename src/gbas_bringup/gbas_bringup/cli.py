@@ -35,7 +35,9 @@ app = typer.Typer(
 )
 bag_app = typer.Typer(help="Look into recorded bags, check them, save damaged ones.", no_args_is_help=True)
 vdb_app = typer.Typer(help="Messages of the VHF data broadcast: bits to values and back.", no_args_is_help=True)
+sim_app = typer.Typer(help="Simulated worlds as files.", no_args_is_help=True)
 app.add_typer(bag_app, name="bag")
+app.add_typer(sim_app, name="sim")
 app.add_typer(vdb_app, name="vdb")
 
 Json = Annotated[bool, typer.Option("--json", help="Print JSON only.", callback=remember_json)]
@@ -319,6 +321,42 @@ def bench(
         return
     body.print_report(result)
     _print_places({"report": folder / "bench.json"})
+
+
+# --- simulated worlds
+
+
+@sim_app.command("export")
+def sim_export(
+    scenario: Annotated[str, typer.Argument(metavar="SCENARIO", help="A .yaml file, or a name from launch-list.")],
+    rinex: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder for RINEX 3 files of every receiver and the truth.")
+    ] = None,
+    bag: Annotated[bool, typer.Option("--bag", help="Run the scenario, too, and record a bag.")] = False,
+    out: Annotated[Path | None, typer.Option(help="Folder for the bag (default: out/SCENARIO-N).")] = None,
+    as_json: Json = False,
+) -> None:
+    """Write a scenario as observation, navigation and truth files that other software reads."""
+    from gbas_bringup import sim_export as body
+    from gbas_bringup.progress import progress
+    from gbas_bringup.resources import named_config
+
+    if rinex is None and not bag:
+        raise typer.BadParameter("nothing to write: give --rinex DIR, --bag, or both")
+    path = named_config(scenario)
+    places: dict[str, Path] = {}
+    if rinex is not None:
+        with progress("exporting", enabled=not as_json) as update:
+            files = body.export_rinex(path, rinex, progress=lambda done, total: update(done, total, ""))
+        places = {each.stem: each for each in files.observations} | {"navigation": files.navigation}
+        places |= {} if files.truth is None else {"truth": files.truth}
+    if bag:
+        folder = _new_out(out, path.stem)
+        places["bag"] = body.export_bag(path, folder, quiet=as_json, command=_command_line())
+    if as_json:
+        print_json({"simulated": True, "files": {name: str(place) for name, place in places.items()}})
+    else:
+        _print_places(places)
 
 
 # --- bags
