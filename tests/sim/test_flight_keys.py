@@ -39,8 +39,8 @@ segments:
   1: {kind: cruise, duration_s: 60.0}
   2: {kind: turn, heading_change_deg: -90.0, bank_deg: 25.0, roll_rate_degps: 5.0}
   3: {kind: curved, turn_deg: 90.0, radius_m: 3000.0, join_distance_m: 6000.0, speed_mps: 72.0,
-      intercept_distance_m: 9000.0}
-  4: {kind: missed_approach, from_height_m: 60, height_gain_m: 600.0, vertical_speed_mps: 10.0}
+      intercept_distance_m: 9000.0, level_time_s: 90.0}
+  4: {kind: missed_approach, from_height_m: 60, height_gain_m: 600.0, vertical_speed_mps: 10.0, speed_mps: 85}
 """)
 
 
@@ -153,6 +153,12 @@ def test_refusals(mapping, message: str) -> None:
 def test_approach_without_a_final_approach() -> None:
     with pytest.raises(ValueError, match="no final approach to fly it on"):
         flight_from_mapping(FILE)
+
+
+def test_what_the_aircraft_cannot_do_is_refused_when_read() -> None:
+    steep = {**FILE["segments"], 2: {"kind": "turn", "heading_change_deg": 90.0, "bank_deg": 60.0}}
+    with pytest.raises(ValueError, match=r"^flight: segment 2 \(turn\), .* bank \[deg\] = .* \(airliner\)$"):
+        flight_from_mapping(changed(segments=steep), approach=APPROACH)
 
 
 def test_what_follows_an_approach() -> None:

@@ -102,18 +102,32 @@ class Flight:
     turning_earth: bool = True
 
     @cached_property
+    def _planned(self) -> _Planned:
+        return _planned(self)
+
+    @cached_property
     def _tables(self) -> _Tables:
         return _tables(self)
 
     @property
     def duration_s(self) -> float:
         """From the start to the end of the plan [s], rounded to a nanosecond: durations asked for are met exactly."""
-        return round(float(self._tables.reference.time_s[-1]), 9)
+        return round(float(self._planned.reference.time_s[-1]), 9)
 
     @property
     def phases(self) -> tuple[Phase, ...]:
         """Manoeuvres with their times."""
-        return self._tables.reference.phases
+        return self._planned.reference.phases
+
+    def check(self) -> None:
+        """Lay the plan out without flying it.
+
+        Raises
+        ------
+        ValueError
+            When it cannot be laid out or is more than the aircraft can do, naming manoeuvre, quantity, value and bound.
+        """
+        self._planned  # noqa: B018  # raises
 
     def state(self, since_start_s: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Position and velocity.
@@ -142,10 +156,17 @@ class Flight:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class _Planned:
+    """A plan laid out, and the controls it takes."""
+
+    reference: Reference
+    trimmed: Trim
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class _Tables:
     """What a flight looks up: positions are from the origin, so that rounding is of the distance flown."""
 
-    reference: Reference
     origin_m: FloatArray
     position: SmoothTable
     flown: SmoothTable
@@ -153,32 +174,36 @@ class _Tables:
 
 
 @lru_cache(maxsize=4)
-def _tables(flight: Flight) -> _Tables:
-    """Lay out, check and fly a flight; equal flights are flown once."""
+def _planned(flight: Flight) -> _Planned:
+    """Lay out and check a flight; equal flights are laid out once."""
+    wind = flight.wind if flight.planned_wind is None else flight.planned_wind
     try:
-        return _fly(flight)
+        reference = lay_out(flight.plan, wind)
+        trimmed = trim(reference, flight.aircraft, Surroundings(wind=wind, turning_earth=flight.turning_earth))
+        check(trimmed, reference, flight.aircraft)
     except ValueError as error:
         raise ValueError(f"flight: {error}") from None
+    return _Planned(reference=reference, trimmed=trimmed)
 
 
-def _fly(flight: Flight) -> _Tables:
-    expected = Surroundings(
-        wind=flight.wind if flight.planned_wind is None else flight.planned_wind, turning_earth=flight.turning_earth
-    )
-    actual = Surroundings(wind=flight.wind, turning_earth=flight.turning_earth)
-    reference = lay_out(flight.plan, expected.wind)
-    trimmed = trim(reference, flight.aircraft, expected)
-    check(trimmed, reference, flight.aircraft)
-    flown = fly(Model(aircraft=flight.aircraft, surroundings=actual, reference=reference), trimmed)
-    path = reference.path
+@lru_cache(maxsize=4)
+def _tables(flight: Flight) -> _Tables:
+    """Fly a flight; equal flights are flown once."""
+    planned = _planned(flight)
+    reference, path = planned.reference, planned.reference.path
+    surroundings = Surroundings(wind=flight.wind, turning_earth=flight.turning_earth)
     origin = ecef_from_geodetic(path.lat_rad[0], path.lon_rad[0], path.height_m[0])
-    flown_table = _flown_table(flown, reference, origin)
-    planned_table = _planned_table(reference, trimmed, origin)
-    _check_tracking(flown_table, planned_table, reference)
+    try:
+        flown = fly(Model(aircraft=flight.aircraft, surroundings=surroundings, reference=reference), planned.trimmed)
+        flown_table = _flown_table(flown, reference, origin)
+        planned_table = _planned_table(reference, planned.trimmed, origin)
+        _check_tracking(flown_table, planned_table, reference)
+    except ValueError as error:
+        raise ValueError(f"flight: {error}") from None
     position = SmoothTable(
         start=flown_table.start, spacing=flown_table.spacing, coefficients=flown_table.coefficients[..., :3].copy()
     )
-    return _Tables(reference=reference, origin_m=origin, position=position, flown=flown_table, planned=planned_table)
+    return _Tables(origin_m=origin, position=position, flown=flown_table, planned=planned_table)
 
 
 def _flown_table(flown: Flown, reference: Reference, origin_m: FloatArray) -> SmoothTable:

@@ -15,7 +15,7 @@ ROS parameter files can hold::
       1: {kind: cruise, duration_s: 60.0}
       2: {kind: turn, heading_change_deg: -90.0, bank_deg: 25.0}
       3: {kind: curved, turn_deg: 90.0, radius_m: 3000.0, join_distance_m: 6000.0, speed_mps: 72.0,
-          intercept_distance_m: 9000.0}
+          intercept_distance_m: 9000.0, level_time_s: 90.0}
 
 or, for the flight of the paper, ``profile: five_phase`` in place of ``speed_mps``, ``configuration`` and ``segments``.
 Manoeuvres have the fields of :mod:`gbas_sim.flight_dynamics.segments`, with ``_deg`` for ``_rad`` and ``_degps`` for
@@ -56,12 +56,15 @@ def flight_from_mapping(mapping: Mapping[str, Any], *, approach: FinalApproach |
     Raises
     ------
     ValueError
-        Naming a key that is unknown, missing, of the wrong kind or out of bounds.
+        Naming a key that is unknown, missing, of the wrong kind or out of bounds, or the manoeuvre that the aircraft
+        cannot fly.
     """
     try:
-        return _flight(_nested(mapping), approach)
+        flight = _flight(_nested(mapping), approach)
     except ValueError as error:
         raise ValueError(f"flight: {error}") from None
+    flight.check()
+    return flight
 
 
 def _flight(keys: Mapping[str, Any], approach: FinalApproach | None) -> Flight:
