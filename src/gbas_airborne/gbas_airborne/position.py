@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Final, Literal, cast
+from typing import Final, Literal, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -122,6 +122,18 @@ class Attempt:
     range_error_m: FloatArray = field(default_factory=missing)
 
 
+class _Step(NamedTuple):
+    """One Gauss-Newton step, in the approach frame."""
+
+    position_m: FloatArray
+    reason: NDArray[np.int64]
+    los: FloatArray
+    sigma_m: FloatArray
+    projection: FloatArray
+    innovation_m: FloatArray
+    change_m: FloatArray
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Sky:
     """Geometry and sigmas at one trial position."""
@@ -187,13 +199,14 @@ def solve(inputs: PositionInputs, start_ecef_m: FloatArray, speed: Speed, params
     for _ in range(params.max_iterations):
         sky = _sky(inputs, position, speed, params)
         reason = _reasons(inputs, sky, params)
-        fix = _step(inputs, sky, position, reason, params)
-        moved = fix.position_m - position if fix is not None else np.zeros(3)
+        step = _step(inputs, sky, position, reason, params)
+        moved = step.position_m - position if step is not None else np.zeros(3)
         if float(moved @ moved) < CONVERGED_M**2:
             break
         position = position + moved
     else:
-        fix = None
+        step = None
+    fix = _fix(inputs, sky, step) if step is not None else None
     return Attempt(fix=fix, reason=reason, elevation_rad=sky.elevation_rad, distance_m=sky.distance_m)
 
 
@@ -248,8 +261,8 @@ def _reasons(inputs: PositionInputs, sky: _Sky, params: AirborneParams) -> NDArr
 
 def _step(
     inputs: PositionInputs, sky: _Sky, position: FloatArray, reason: NDArray[np.int64], params: AirborneParams
-) -> Fix | None:
-    """One Gauss-Newton step, in the approach frame."""
+) -> _Step | None:
+    """The step from a position; None when the geometry is too weak."""
     used = reason == int(Rejection.NONE)
     approach = inputs.approach
     rot = approach.rot_approach_ecef if approach is not None else ROT_NWU_ENU @ sky.rot_enu
@@ -260,7 +273,14 @@ def _step(
         return None
     innovation = np.where(used, inputs.sources.range_m + sky.tropo_m - sky.range_m, 0.0)
     change = projection @ innovation
-    los0 = np.where(used, los, 0.0)
+    return _Step(position + rot.T @ change[:3], reason, los, sigma, projection, innovation, change)
+
+
+def _fix(inputs: PositionInputs, sky: _Sky, step: _Step) -> Fix:
+    """The position a last step leads to, with all a protection level and the range test need."""
+    used = step.reason == int(Rejection.NONE)
+    approach, projection, change = inputs.approach, step.projection, step.change_m
+    los0 = np.where(used, step.los, 0.0)
     predicted = change[3:] @ CLOCK_GROUPS - change[:3] @ los0
     leverage = (projection[3:] * CLOCK_GROUPS).sum(axis=0) - (projection[:3] * los0).sum(axis=0)
     s_vert, s_lat = vertical_lateral(projection, approach.gpa_rad if approach is not None else 0.0)
@@ -269,9 +289,9 @@ def _step(
         return np.where(used, values, np.nan)
 
     return Fix(
-        position_m=position + rot.T @ change[:3],
+        position_m=step.position_m,
         clock_m=np.where((CLOCK_GROUPS & used).any(axis=1), change[3:], np.nan),
-        reason=reason,
+        reason=step.reason,
         azimuth_rad=only(sky.azimuth_rad),
         elevation_rad=only(sky.elevation_rad),
         projection=projection,
@@ -281,8 +301,8 @@ def _step(
         sigma_air_m=only(sky.sigma_air_m),
         sigma_tropo_m=only(sky.sigma_tropo_m),
         sigma_iono_m=only(sky.sigma_iono_m),
-        sigma_m=sigma,
-        residual_m=only(innovation - predicted),
+        sigma_m=step.sigma_m,
+        residual_m=only(step.innovation_m - predicted),
         leverage=only(leverage),
         distance_m=sky.distance_m,
         speed_mps=sky.speed_mps,

@@ -100,7 +100,7 @@ def projection_matrix(
     kept = np.concatenate([np.ones(3, dtype=bool), (groups & used).any(axis=1)])
     if np.count_nonzero(used) < np.count_nonzero(kept) or not kept[3:].any():
         return None
-    design = np.concatenate([-los, groups])[np.ix_(kept, used)].T
+    design = np.concatenate([-los, groups])[kept].compress(used, axis=1).T
     weight = 1.0 / sigma_m[used]
     left, singular, right = np.linalg.svd(weight[:, np.newaxis] * design, full_matrices=False)
     if not singular[0] <= max_condition * singular[-1]:
