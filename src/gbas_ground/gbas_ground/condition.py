@@ -51,7 +51,7 @@ def conclude(
     short = made.count < params.min_receivers
     waiting = short & (ready < params.min_receivers) & (ready + settling >= params.min_receivers)
     channel_cause = _channel_cause(tracked, exclusions)
-    no_rate = ~np.isfinite(made.prc_m + made.rrc_mps).all(axis=0)
+    no_rate = np.asarray(~np.isfinite(made.prc_m + made.rrc_mps).all(axis=0))
 
     excluded = ChannelState.EXCLUDED
     reasons: tuple[tuple[BoolArray, ChannelState, ArrayLike], ...] = (
