@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 
 import pytest
 import yaml
@@ -19,6 +20,7 @@ from gbas_sim.flight_dynamics import (
     StraightInApproach,
     Turn,
     flight_from_mapping,
+    keys,
 )
 
 APPROACH = FinalApproach.from_course(
@@ -63,6 +65,16 @@ def test_every_key_is_read() -> None:
     assert curved.turn_rad == math.radians(90.0)
     assert curved.radius_m == 3000.0
     assert isinstance(missed, MissedApproach)
+
+
+def test_the_documented_example_can_be_flown() -> None:
+    """The example in the module's description, but for the start, which goes with plans without an approach."""
+    block = keys.__doc__.split("::\n\n")[1].split("\n\nor,")[0]
+    example = yaml.safe_load(textwrap.dedent(block))
+    del example["start"]
+    flight = flight_from_mapping(example, approach=APPROACH)
+    assert [phase.kind for phase in flight.phases] == ["cruise", "turn", "curved"]
+    assert flight.planned_wind is not None
 
 
 def test_lists_and_dotted_keys_mean_the_same() -> None:
