@@ -77,27 +77,32 @@ def offline(files: dict[str, Any], epochs: slice = slice(0, SECONDS + 1)) -> lis
     return list(chain.run(chosen))
 
 
-def start_chain(launcher: Any, **more: Any) -> None:
+def start_chain(launcher: Any, own_ephemerides: bool, **more: Any) -> None:
     parameters = {"ground": STATION, "airborne": RECEIVER, "start_wait_s": 60.0, **more}
     for module in CHAIN:
         joins = module.endswith(("integrity_monitor", "positioning"))
-        launcher.start(module, {**parameters, **(PATIENT if joins else {})})
+        remap = ("-r", "/gbas/ephemeris:=/gbas/airborne/ephemeris") if own_ephemerides else ()
+        aboard = module.startswith("gbas_airborne")
+        launcher.start(module, {**parameters, **(PATIENT if joins else {})}, remap if aboard else ())
 
 
 def raw(schema: Any, records: list[Any]) -> list[bytes]:
     return [schema.encode(record).tobytes() for record in records]
 
 
-@pytest.mark.parametrize(("speed", "seconds"), [(0.0, SECONDS), (20.0, 40)])
+@pytest.mark.parametrize(("speed", "seconds", "own_ephemerides"), [(0.0, SECONDS, False), (20.0, 40, True)])
 def test_live_nodes_give_the_bits_of_the_offline_chain(
-    launcher: Any, probe: Any, files: dict[str, Any], speed: float, seconds: int
+    launcher: Any, probe: Any, files: dict[str, Any], speed: float, seconds: int, own_ephemerides: bool
 ) -> None:
+    """At full speed, and paced with navigation files of the aircraft's own."""
     integrity, bursts = probe.listen(topics.GROUND_INTEGRITY), probe.bursts()
     solutions, protections = probe.listen(topics.AIRBORNE_SOLUTION), probe.listen(topics.AIRBORNE_PROTECTION)
     events, fixes = probe.events(), probe.listen(topics.AIRBORNE_FIX, NavSatFix)
     scalars = {name: probe.listen(topic, Float64) for name, topic in SCALARS.items()}
     services = probe.listen(topics.AIRBORNE_SERVICE, UInt8)
-    start_chain(launcher, recorders=1)  # the probe is a recorder of all outputs of the chain
+    start_chain(launcher, own_ephemerides, recorders=1)  # the probe is a recorder of all outputs of the chain
+    if own_ephemerides:
+        files = {**files, "user_nav_files": files["nav_files"]}
     replay = launcher.start(REPLAY, {**files, "speed": speed, "stop_s": float(seconds), "start_wait_s": 60.0})
     expected = offline(files, slice(0, seconds + 1))
     ground = [each for each in expected if isinstance(each, GroundOutput)]
