@@ -102,7 +102,7 @@ def test_live_nodes_give_the_bits_of_the_offline_chain(
     services = probe.listen(topics.AIRBORNE_SERVICE, UInt8)
     start_chain(launcher, own_ephemerides, recorders=1)  # the probe is a recorder of all outputs of the chain
     if own_ephemerides:
-        files = {**files, "user_nav_files": files["nav_files"]}
+        files = {**files, "user_nav_files": list(files["nav_files"])}
     replay = launcher.start(REPLAY, {**files, "speed": speed, "stop_s": float(seconds), "start_wait_s": 60.0})
     expected = offline(files, slice(0, seconds + 1))
     ground = [each for each in expected if isinstance(each, GroundOutput)]
