@@ -65,7 +65,9 @@ class Normals:
 
     def draw(self, number: int, epoch: int, shape: tuple[int, ...]) -> FloatArray:
         """Numbers of one receiver and epoch; epochs may be negative."""
-        self._state["state"]["counter"][:] = (0, 0, epoch & _WORD, number)
+        counter = self._state["state"]["counter"]
+        counter[:2] = 0
+        counter[2], counter[3] = epoch & _WORD, number
         self._philox.state = self._state
         return self._generator.standard_normal(shape)
 
@@ -123,7 +125,7 @@ class GaussMarkov:
         self._normals, self._numbers, self._shape = normals, numbers, shape
         correlation = np.broadcast_to(np.asarray(correlation_epochs, dtype=np.float64), shape)
         if not bool((correlation >= 0.0).all()):
-            raise ValueError(f"correlation time of {correlation.min()!r} epochs is below 0")
+            raise ValueError(f"correlation time of {float(correlation.min())!r} epochs is below 0")
         longest = float(correlation.max(initial=0.0))
         halvings = max(0, math.ceil(math.log2(max(1.0, _BLOCK_IN_CORRELATION_TIMES * longest))))
         self._block = 2**halvings
