@@ -3,7 +3,7 @@
 Pure functions on the satellite axis. :func:`ranging_sources` applies every rule that does not need the position;
 elevation, distance and the range test follow in :mod:`gbas_airborne.position`.
 
-Source: facts 3.1 and 3.5 (Annex 10 vol. I, App. B 3.6.5.2; RTCA DO-253 2.3.8).
+Source: ICAO Annex 10 vol. I, App. B 3.6.5.2; RTCA DO-253 2.3.8.
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ def corrected_range_m(
 ) -> FloatArray:
     """Corrected range without troposphere: P + PRC + RRC (t - t_z) + c dt_sv [m], (N_SATS,).
 
-    Source: facts 3.1 (Annex 10 vol. I, App. B 3.6.5.2).
+    Source: ICAO Annex 10 vol. I, App. B 3.6.5.2.
     """
     return smoothed_m + corrections.prc_m + corrections.rrc_mps * age_s + SPEED_OF_LIGHT_MPS * satellite_clock_s
 
@@ -249,7 +249,7 @@ def usable_b_values(b_m: FloatArray, n_receivers: int, valid: BoolArray) -> Bool
     that has a protection level only when the station says so (no number of receivers in its station data) and no other
     correction has B values, so that the multiplier of one receiver holds for all.
 
-    Source: facts 3.2; the rule for stations of one receiver is ours.
+    Source: RTCA DO-253 (approach protection levels); the rule for stations of one receiver is ours.
     """
     count = np.isfinite(b_m).sum(axis=0)
     several = count >= 2

@@ -1,6 +1,7 @@
 """Guidance: where the aircraft is on the approach, whether that is within coverage, and the alert limits there.
 
-Source: facts 3.3, 3.6 (service volume) and 3.7; geometry in :mod:`gbas_core.approach`.
+Source: ICAO Annex 10 vol. I, tables B-68 and B-69 (alert limits) and 3.7.3.5.3 (service volume); RTCA DO-253
+(deviations); geometry in :mod:`gbas_core.approach`.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from gbas_core.approach import APD_AB, ApproachDeviation, FinalApproach, alert_l
 from gbas_core.record import FloatArray
 from gbas_msgs_py.records import SolutionEpoch
 
-# Known (facts 3.6): minimum GAST-C service volume, lateral from the LTP, vertical from the GPIP.
+# Known (ICAO Annex 10 vol. I, 3.7.3.5.3): minimum GAST-C service volume, lateral from the LTP, vertical from the GPIP.
 HALF_WIDTH_AT_LTP_M: Final = 137.0
 INNER_SPLAY_RAD: Final = math.radians(35.0)
 INNER_RANGE_M: Final = 28_000.0
@@ -40,7 +41,7 @@ def in_service_volume(approach: FinalApproach, deviation: ApproachDeviation) -> 
     The lower end of 30 m above the threshold is not applied: guidance does not vanish at the decision height, the
     protection levels go on judging it. Positions behind the GPIP are outside.
 
-    Source: facts 3.6.
+    Source: ICAO Annex 10 vol. I, 3.7.3.5.3.
     """
     distance_m, height_m = float(deviation.distance_m), float(deviation.height_m)
     splay_rad = INNER_SPLAY_RAD if distance_m <= INNER_RANGE_M else OUTER_SPLAY_RAD
@@ -86,7 +87,7 @@ def alert_limits_m(solution: SolutionEpoch) -> tuple[float, float]:
     Notes
     -----
     The vertical limit depends on the height of the path below or above the aircraft, not on the aircraft's own height.
-    Without a deviation the limits are the largest (facts 3.3); there is no position then either, so nothing is lost.
+    Without a deviation the limits are the largest (tables B-68 and B-69); there is no position then either, so nothing is lost.
     """
     distance_m = solution.distance_to_ltp_m
     path_height_m = solution.height_above_ltp_m - solution.vertical_m

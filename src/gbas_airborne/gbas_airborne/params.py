@@ -74,7 +74,7 @@ class AirborneParams:
     smoothing_tau_s : float
         Time constant of the carrier smoothing [s]; 100 for GAST-C, 0 switches smoothing off (for comparisons).
     settle_s : float
-        A satellite is used once its filter has run this long [s].
+        A satellite is used once its filter has run this long [s]; see docs/decisions/0002.
     inflate_unsettled : bool
         Scale airborne noise and multipath while the filter settles, and for a time constant below 100 s.
     max_gap_s : float
@@ -118,7 +118,7 @@ class AirborneParams:
 
     Notes
     -----
-    Sources: facts 3.1, 3.2, 3.5. `settle_s`, `max_gap_s`, `max_speed_mps` and the range test are the suite's own.
+    Sources: ICAO Annex 10 vol. I, App. B 3.6.5; RTCA DO-253. `settle_s`, `max_gap_s`, `max_speed_mps` and the range test are the suite's own.
     """
 
     service: str = "C"
@@ -130,7 +130,7 @@ class AirborneParams:
     slot_group: str = ""
     elevation_mask_deg: float = 5.0
     smoothing_tau_s: float = 100.0
-    settle_s: float = 100.0
+    settle_s: float = 230.0
     inflate_unsettled: bool = True
     max_gap_s: float = 3.5
     receiver_jerk_mps3: float = NORMAL_MANOEUVRE_JERK_MPS3

@@ -3,7 +3,7 @@
 The position is found by Gauss-Newton steps from the last one, or from the station's reference point. Each step forms
 lines of sight, tropospheric correction, sigmas and weights anew, so that all belong to the position they lead to.
 
-Source: facts 3.1 (Annex 10 vol. I, App. B 3.6.5; RTCA DO-253 2.3.9 to 2.3.12).
+Source: ICAO Annex 10 vol. I, App. B 3.6.5; RTCA DO-253 2.3.9 to 2.3.12.
 """
 
 from __future__ import annotations

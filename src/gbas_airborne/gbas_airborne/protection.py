@@ -3,7 +3,7 @@
 Pure functions of one epoch's projection, sigmas and B values. A satellite is used when any of its columns is there;
 whatever else is then missing for it (a sigma, a B value) makes the protection level NaN: not protected.
 
-Source: facts 3.2 (RTCA DO-253 approach protection levels).
+Source: RTCA DO-253 (approach protection levels); ICAO Annex 10 vol. I, App. B 3.6.5.5.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def k_ffmd(n_receivers: int, probability: float = 2.5e-8) -> float:
     probability : float
         p, shared equally by the fault-free and the M single receiver fault hypotheses.
 
-    Source: facts 3.2 (generator of the table 5.762, 5.810, 5.847).
+    Source: ICAO Annex 10 vol. I, table B-67 (5.762, 5.810, 5.847), from the probabilities behind it.
     """
     return float(norm.isf(0.5 * probability / (n_receivers + 1)))
 
@@ -39,7 +39,7 @@ def k_ffmd(n_receivers: int, probability: float = 2.5e-8) -> float:
 def k_md(n_receivers: int, probability: float = 2.5e-8, receiver_fault_prior: float = 1e-5) -> float:
     """Missed detection multiplier given a faulted receiver, K_md = Q^-1((p / (M+1)) / (prior / M)).
 
-    Source: facts 3.2 (generator of the table 2.935, 2.898, 2.878).
+    Source: ICAO Annex 10 vol. I, table B-67 (2.935, 2.898, 2.878), from the probabilities behind it.
     """
     return float(norm.isf((probability / (n_receivers + 1)) / (receiver_fault_prior / n_receivers)))
 
@@ -93,7 +93,7 @@ def protection_levels(solution: SolutionEpoch, multipliers: Multipliers) -> Prot
         All NaN when a used satellite lacks anything. With one receiver `h1_m` is NaN and the level is `h0_m`. Without
         K_md_e the bounds are NaN.
 
-    Source: facts 3.2.
+    Source: ICAO Annex 10 vol. I, App. B 3.6.5.5.
     """
     used = _used(solution)
     m_i = receivers_behind(solution.b_m)
@@ -152,7 +152,7 @@ def h1_levels(
     Notes
     -----
     M may differ between satellites. Receiver j then takes the largest K_md (smallest M) of the satellites it is used
-    on; the standard leaves this open (facts 3.2 [U]), the choice is the conservative one.
+    on; the text we could read leaves this open, the choice is the conservative one.
     """
     used = s.any(axis=0)
     behind = np.isfinite(b_m) & used

@@ -4,7 +4,7 @@ What arrives is used only when its FEC and CRC hold, it comes from the one stati
 is authentic where that is asked for, and its time is plausible. Everything else is discarded and counted. Data time
 only: an age is the time of an epoch less the start of the frame the message came in.
 
-Source: facts 1.4 to 1.6 and 3.5 (Annex 10 vol. I, App. B 3.6.4 and 3.6.5; RTCA DO-253 2.3.6 to 2.3.8).
+Source: ICAO Annex 10 vol. I, App. B 3.6.4 and 3.6.5; RTCA DO-253 2.3.6 to 2.3.8.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ from gbas_msgs_py.vdb.messages import Correction100, FasDataSet, Type1, Type2, T
 from gbas_msgs_py.vdb.receive import decode_burst
 
 SOURCE: Final = "positioning"
-# Known (facts 1.6): first letter of the RPI by the lowest slot of the station, A to H.
+# Known (RTCA DO-246E): first letter of the RPI by the lowest slot of the station, A to H.
 RPI_LETTERS: Final = "AXZJCVPT"
-# Known (facts 1.5): 14 is GBAS only, 15 is any provider.
+# Known (ICAO Annex 10 vol. I, App. B 3.6.4.5): 14 is GBAS only, 15 is any provider.
 GBAS_PROVIDERS: Final = (14, 15)
-# Known (facts 1.5, 3.5): 1 to 4 are healthy, 7 is unhealthy; 0, 5 and 6 mean nothing and give no service.
+# Known (ICAO Annex 10 vol. I, table B-65): 1 to 4 are healthy, 7 is unhealthy; 0, 5 and 6 mean nothing and give no service.
 HEALTHY_GCID: Final = (1, 2, 3, 4)
 L1_CA_MEASUREMENT: Final = 0
 GUIDANCE_TYPES: Final = (1, 2, 4, 11)

@@ -206,9 +206,9 @@ class GroundParams:
     settle_time_s: float = _parameter(
         "smoothing",
         "settle_time_s",
-        200.0,
+        230.0,
         "s",
-        "time a filter has to run before its output is used",
+        "time a filter has to run before its output is used (docs/decisions/0002)",
         low=0.0,
         high=3600.0,
     )

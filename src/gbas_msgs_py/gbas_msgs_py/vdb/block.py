@@ -1,6 +1,6 @@
 """Message blocks: header, message, CRC; and the message bodies as tables say.
 
-Source: Annex 10 Volume I, Appendix B, 3.6.3.4; facts 1.4, 1.5.
+Source: Annex 10 Volume I, Appendix B, 3.6.3.4.
 """
 
 from __future__ import annotations

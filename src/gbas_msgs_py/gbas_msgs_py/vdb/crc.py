@@ -5,7 +5,7 @@ first bit on the air in their least significant bit, so both are computed with r
 out reflected: its bit 0 is the coefficient of the highest power, which is transmitted first. The result is therefore
 the integer of the transmitted field, least significant bit first, like any other field.
 
-Source: Annex 10 Volume I, Appendix B, 3.6.3.3.3 (CRC-32Q) and 3.6.3.2.2.3 (ephemeris CRC); facts 1.4 and 1.7.
+Source: Annex 10 Volume I, Appendix B, 3.6.3.3.3 (CRC-32Q) and 3.6.3.2.2.3 (ephemeris CRC).
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ No standard has an ephemeris CRC for Galileo. The suite's own takes the same pol
 fields with the scale factors of the navigation message, and a leading byte that names the message (I/NAV or F/NAV), so
 that the two messages' clocks are told apart. It is private to the suite.
 
-Source: Annex 10 Volume I, Appendix B, 3.6.4.2.3 and facts 1.7 (mask, reconstructed: uncertain); IS-GPS-200N figure 20-1
+Source: Annex 10 Volume I, Appendix B, 3.6.4.2.3 (mask, reconstructed: uncertain); IS-GPS-200N figure 20-1
 and tables 20-I to 20-III; Galileo OS SIS ICD 2.1 tables 39 to 45 and 67 to 74.
 """
 

@@ -1,6 +1,6 @@
 """Forward error correction of a burst: the training sequence code and the Reed-Solomon code of the application data.
 
-Source: Annex 10 Volume I, Appendix B, 3.6.3.3.4; facts 1.2, 1.3.
+Source: Annex 10 Volume I, Appendix B, 3.6.3.3.4.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ station slot identifier (3), the transmission length (17), training FEC (5), app
 significant bit first) and application FEC (each byte most significant bit first); then up to 2 fill bits to complete a
 symbol, and 9 zero bits while the power ramps down. Symbols are absolute phases in units of pi/4.
 
-Source: Annex 10 Volume I, Appendix B, 3.6.2 and 3.6.3, Attachment D example; facts 1.1, 1.2.
+Source: Annex 10 Volume I, Appendix B, 3.6.2 and 3.6.3, Attachment D example.
 """
 
 from __future__ import annotations

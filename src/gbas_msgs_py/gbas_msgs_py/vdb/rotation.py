@@ -13,7 +13,7 @@ in 20, a change takes 2 more), so the limit of 20 frames goes first and a change
 A linked pair of messages has two first places a frame. When a pair becomes one message (18 satellites left of 19) while
 many changes are waiting, the limit can be exceeded by a few frames: the places are then not there.
 
-Source: facts 1.6 (Annex 10 Volume I, Appendix B, 3.6.7.2.2.8 and table B-75).
+Source: ICAO Annex 10 vol. I, App. B 3.6.7.2.2.8 and table B-75.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 Type 1 (and 11) go out in every frame with every satellite; station data, approaches and predictions where there is
 room, at least once in 20 frames. A burst holds at most 222 bytes of application data and a block cannot be divided.
 
-Source: facts 1.4 to 1.6.
+Source: ICAO Annex 10 vol. I, App. B 3.6.3, 3.6.4 and table B-75; RTCA DO-246E (authentication).
 """
 
 from __future__ import annotations

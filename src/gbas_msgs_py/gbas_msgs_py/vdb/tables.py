@@ -1,6 +1,6 @@
 """The field tables of the VDB messages, in the order of transmission: this module is data.
 
-Source: Annex 10 Volume I, Appendix B, tables B-62 to B-77 and facts 1.4 to 1.5. Entries marked (uncertain) are
+Source: Annex 10 Volume I, Appendix B, tables B-62 to B-77 and RTCA DO-246E. Entries marked (uncertain) are
 reconstructed; see docs/conventions.md.
 """
 
