@@ -6,7 +6,7 @@ comparison with a missing number never holds.
 Without a selected approach there are no alert limits. Service C then means that position and protection levels are
 valid, the alert limits are NaN, and whoever uses the position compares the levels with limits of their own.
 
-Source: facts 3.2, 3.3, 3.5 and 3.6.
+Source: ICAO Annex 10 vol. I, App. B 3.6.5; RTCA DO-253 (approach service type C, time-outs).
 """
 
 from __future__ import annotations
@@ -167,7 +167,8 @@ def _protection_failure(levels: ProtectionLevels, val_m: float, lal_m: float, pa
         ("veb_above_val", veb_m, val_m, True),
         ("leb_above_lal", leb_m, lal_m, True),
     ):
-        if not (value <= limit or (optional and math.isnan(value))):
+        bounded = value <= limit or (optional and math.isnan(value))
+        if not (bounded and math.isfinite(limit)):
             return Failure(ApproachState.DIFFERENTIAL, cause, value, limit)
     return None
 

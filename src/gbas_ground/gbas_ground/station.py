@@ -194,13 +194,9 @@ class GroundStation:
         """
         if len(epoch.observations) != params.n_receivers:
             raise ValueError(f"{len(epoch.observations)} observations for {params.n_receivers} reference receivers")
-        events = _Events(epoch)
-        admitted = _admit(state, epoch, params, events)
-        if admitted is None:
-            refused = replace(state, refused=_refused(state, epoch), refused_key=epoch_key(epoch.gps_week, epoch.tow_s))
-            return refused, empty_integrity(epoch.gps_week, epoch.tow_s), events.all()
-        new, integrity = _process(admitted, epoch, params, events)
-        return new, integrity, events.all()
+        # Nonsense in an ephemeris may overflow on its way to a monitor that refuses it.
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+            return _monitor(state, epoch, params)
 
     @staticmethod
     def broadcast(
@@ -217,6 +213,18 @@ class GroundStation:
         monitor, integrity, events = GroundStation.monitor(state.monitor, epoch, params)
         broadcast, bursts = GroundStation.broadcast(state.broadcast, integrity, params)
         return StationState(monitor=monitor, broadcast=broadcast), integrity, bursts, events
+
+
+def _monitor(
+    state: MonitorState, epoch: GroundEpoch, params: GroundParams
+) -> tuple[MonitorState, IntegrityEpoch, tuple[Event, ...]]:
+    events = _Events(epoch)
+    admitted = _admit(state, epoch, params, events)
+    if admitted is None:
+        refused = replace(state, refused=_refused(state, epoch), refused_key=epoch_key(epoch.gps_week, epoch.tow_s))
+        return refused, empty_integrity(epoch.gps_week, epoch.tow_s), events.all()
+    new, integrity = _process(admitted, epoch, params, events)
+    return new, integrity, events.all()
 
 
 class _Events:
