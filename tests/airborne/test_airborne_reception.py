@@ -163,6 +163,14 @@ def test_two_first_halves_are_no_pair() -> None:
     assert state.counts.unpaired == 1
 
 
+def test_halves_of_a_pair_twenty_minutes_apart_are_no_pair() -> None:
+    """The modified Z-count is the same again."""
+    state, _ = received(frame(type1(5, flag=1)), state=selected())
+    later_s = TOW_S + 1200.0
+    state, _ = received(frame(type1(71, flag=3, tow_s=later_s), tow_s=later_s), state=state, tow_s=later_s)
+    assert state.corrections is None
+
+
 def test_a_single_message_ends_the_wait_for_the_second() -> None:
     bursts = frame(type1(5, flag=1)), frame(type1(6), slot=1), frame(type1(7, flag=3), slot=2)
     state, _ = received(*bursts, state=selected())
@@ -200,6 +208,39 @@ def test_older_corrections_do_not_replace_newer() -> None:
     state, _ = received(frame(type1(6, tow_s=TOW_S - 1.0), tow_s=TOW_S - 1.0), state=state)
     assert state.corrections is not None
     assert state.corrections.tow_s == TOW_S
+
+
+def test_a_burst_of_an_earlier_frame_comes_too_late() -> None:
+    """Else old station data would make a station healthy again."""
+    state = selected(gcid=7)
+    old = frame(station_data(gcid=1), tow_s=TOW_S - 5.0)
+    state, events = received(old, state=state)
+    assert state.station is not None
+    assert state.station.gcid == 7
+    assert [event.cause for event in events] == ["burst_out_of_order"]
+    assert state.counts.unusable == 1
+
+
+def test_station_data_that_are_not_repeated_are_forgotten() -> None:
+    state = selected()
+    for seconds, known in ((30.0, True), (60.0, True), (60.5, False)):
+        tow_s = TOW_S + seconds
+        state, events = received(frame(type1(5, tow_s=tow_s), tow_s=tow_s), state=state, tow_s=tow_s)
+        assert (state.station is not None) == known
+    assert [event.cause for event in events] == ["station_data_timeout"]
+    assert state.corrections is None
+
+
+def test_an_approach_that_is_not_repeated_is_forgotten() -> None:
+    params = AirborneParams(rpds=5)
+    state, _ = received(frame(station_data(), Type4(data_sets=(fas_data_set(),))), params=params)
+    assert state.approach is not None
+    for seconds in (30.0, 60.5):
+        tow_s = TOW_S + seconds
+        state, events = received(frame(station_data(), tow_s=tow_s), state=state, tow_s=tow_s, params=params)
+    assert state.approach is None
+    assert state.station is not None
+    assert [event.cause for event in events] == ["approach_timeout"]
 
 
 def test_later_frames_wait_for_their_epoch() -> None:
