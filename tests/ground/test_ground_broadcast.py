@@ -19,7 +19,7 @@ from gbas_msgs_py.vdb.receive import decode_burst
 from ground_runs import half_seconds, params, run
 from synthetic_ranges import TOW_S, WEEK, truth
 
-# Half of the last bit of each field (facts 1.5), with room for the rounding of the conversion.
+# Half of the last bit of each field (ICAO Annex 10 vol. I, table B-63), with room for the rounding of the conversion.
 HALF = {"prc": 0.005, "rrc": 0.0005, "b": 0.025}
 SIGMA_LSB = 0.02
 EPSILON = 1e-9
@@ -85,7 +85,7 @@ def test_first_measurement_owns_crc_and_rotates(full):
                 assert message.ephemeris_crc == integrity.ephemeris_crc[satellite]
                 assert message.ephemeris_decorrelation == pytest.approx(station.p_ephemeris, abs=5e-6)
                 first[satellite] = True
-    # 10 s of frames, two messages each: every satellite was first (facts: once per 10 s)
+    # 10 s of frames, two messages each: every satellite was first (Annex 10, App. B 3.6.7.2.2.8: once per 10 s)
     assert set(first) == set(np.flatnonzero(out.integrity[-1].state == ChannelState.USABLE))
 
 
@@ -97,7 +97,7 @@ def test_station_data_and_approach_are_sent(tmp_path):
     station, out = noisy(3, approaches=(approach,))
     station_data = [message for bursts in out.bursts for message in messages(bursts, Type2)]
     sets = [each for bursts in out.bursts for message in messages(bursts, Type4) for each in message.data_sets]
-    assert len(station_data) >= 2  # 15 s; facts: at least once in 20 frames
+    assert len(station_data) >= 2  # 15 s; ICAO Annex 10 vol. I, table B-75: at least once in 20 frames
     assert len(sets) >= 2
     assert sets[0].fas.runway_number == 26
     assert sets[0].fas.reference_path_data_selector == 4

@@ -66,7 +66,7 @@ def test_correction_limits():
 
 
 def test_ephemeris_change():
-    """A satellite 2.4 km along its orbit from where the last ephemeris had it; facts: 250 m is the bound."""
+    """A satellite 2.4 km along its orbit from where the last ephemeris had it; 250 m is the bound."""
     old, new = constellation(iod=1), constellation(iod=2)
     shift_m = 2400.0
     new.m0_rad[5] += shift_m / new.sqrt_a[5] ** 2

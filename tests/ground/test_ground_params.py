@@ -33,7 +33,7 @@ def test_smallest_configuration_claims_nothing():
     station = GroundParams.from_mapping(MINIMAL)
     message = station.station_message()
     assert message.gcid == GCID_UNHEALTHY
-    # the largest values the fields can carry: facts 1.5
+    # the largest values the fields can carry: ICAO Annex 10 vol. I, tables B-62 to B-66
     assert message.sigma_vert_iono_gradient == 25.5e-6
     assert message.refractivity_uncertainty == 255.0
     assert message.adb1.k_md_e_c_gps == 12.75

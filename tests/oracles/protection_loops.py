@@ -1,6 +1,6 @@
 """Protection levels a second time: scalars and loops, one satellite and one receiver after the other.
 
-Written from facts about RTCA DO-253's formulas alone, without any function of the suite. Directions are given as
+Written from RTCA DO-253's formulas alone, without any function of the suite. Directions are given as
 azimuth and elevation, the projection comes from the normal equations.
 """
 

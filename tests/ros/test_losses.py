@@ -116,7 +116,7 @@ class Aircraft:
 def test_radio_silent_for_four_seconds(
     launcher: Any, probe: Any, recording: Recording, epochs: list[RecordedEpoch], frames: list[tuple[Any, ...]]
 ) -> None:
-    """Service until 3.5 s after the last type 1 message (facts 3.6), none after, and again when the radio is back."""
+    """Service until 3.5 s after the last type 1 message (RTCA DO-253), none after, and again when the radio is back."""
     aircraft = Aircraft(launcher, probe, recording)
     n = SETTLED
     before = aircraft.fly(epochs[:n], frames[:n])

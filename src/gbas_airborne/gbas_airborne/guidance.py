@@ -87,7 +87,8 @@ def alert_limits_m(solution: SolutionEpoch) -> tuple[float, float]:
     Notes
     -----
     The vertical limit depends on the height of the path below or above the aircraft, not on the aircraft's own height.
-    Without a deviation the limits are the largest (tables B-68 and B-69); there is no position then either, so nothing is lost.
+    Without a deviation the limits are the largest (tables B-68 and B-69); there is no position then either, so nothing
+    is lost.
     """
     distance_m = solution.distance_to_ltp_m
     path_height_m = solution.height_above_ltp_m - solution.vertical_m

@@ -118,7 +118,8 @@ class AirborneParams:
 
     Notes
     -----
-    Sources: ICAO Annex 10 vol. I, App. B 3.6.5; RTCA DO-253. `settle_s`, `max_gap_s`, `max_speed_mps` and the range test are the suite's own.
+    Sources: ICAO Annex 10 vol. I, App. B 3.6.5; RTCA DO-253. `settle_s`, `max_gap_s`, `max_speed_mps`,
+    `station_data_timeout_s` and the range test are the suite's own.
     """
 
     service: str = "C"

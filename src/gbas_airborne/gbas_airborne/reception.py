@@ -33,7 +33,8 @@ SOURCE: Final = "positioning"
 RPI_LETTERS: Final = "AXZJCVPT"
 # Known (ICAO Annex 10 vol. I, App. B 3.6.4.5): 14 is GBAS only, 15 is any provider.
 GBAS_PROVIDERS: Final = (14, 15)
-# Known (ICAO Annex 10 vol. I, table B-65): 1 to 4 are healthy, 7 is unhealthy; 0, 5 and 6 mean nothing and give no service.
+# Known (ICAO Annex 10 vol. I, table B-65): 1 to 4 are healthy, 7 is unhealthy; 0, 5 and 6 mean nothing and give no
+# service.
 HEALTHY_GCID: Final = (1, 2, 3, 4)
 L1_CA_MEASUREMENT: Final = 0
 GUIDANCE_TYPES: Final = (1, 2, 4, 11)
