@@ -26,8 +26,8 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import Float64MultiArray, String, UInt8MultiArray
 
-from gbas_msgs_py import ros, topics
-from gbas_msgs_py.qos import qos_of
+from gbas_msgs_py import ros, tables, topics
+from gbas_msgs_py.qos import DATA, qos_of
 from gbas_msgs_py.transport import use_profile
 
 DOMAINS = range(60, 100)
@@ -165,6 +165,17 @@ class Probe:
         profile = ros.qos_profile(qos_of(topic))
         self.node.create_subscription(message_type, topic, lambda message: heard.append(convert(message)), profile)
         return heard
+
+    def report_progress(self, topic: str) -> None:
+        """Be a reader a driver waits for, under the name ``probe``: report each table that arrives on a topic."""
+        publisher = self.node.create_publisher(Float64MultiArray, topics.progress("probe"), ros.qos_profile(DATA))
+
+        def report(message: Float64MultiArray) -> None:
+            done = ros.table_from_msg(message)
+            record = tables.ProgressEpoch(gps_week=done.gps_week, tow_s=done.tow_s)
+            publisher.publish(ros.table_to_msg(tables.PROGRESS, record))
+
+        self.node.create_subscription(Float64MultiArray, topic, report, ros.qos_profile(DATA))
 
     def events(self) -> list[Any]:
         return self.listen(topics.EVENTS, String, ros.event_from_msg)

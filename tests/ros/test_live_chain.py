@@ -51,6 +51,7 @@ STATION: dict[str, Any] = {
     "vdb": {"slots": "AB"},
 }
 RECEIVER: dict[str, Any] = {"settle_s": 20.0, "max_speed_mps": 1.0}
+WAITING = {"wait_for": ["protection_level", "probe"], "start_wait_s": 60.0}
 PATIENT = {"join_timeout_s": 60.0, "start_wait_s": 60.0}
 """No deadline may pass because the machine is busy."""
 
@@ -64,7 +65,7 @@ def files(data_dir: Path) -> dict[str, Any]:
     }
 
 
-def offline(files: dict[str, Any], epochs: slice = slice(0, SECONDS + 1)) -> list[GroundOutput | AirborneOutput]:
+def offline(files: dict[str, Any], epochs: slice) -> list[GroundOutput | AirborneOutput]:
     recording = Recording.open(files["ground_files"], files["user_file"], files["nav_files"])
     chain = Chain(
         GroundParams.from_mapping(STATION),
@@ -90,7 +91,10 @@ def raw(schema: Any, records: list[Any]) -> list[bytes]:
     return [schema.encode(record).tobytes() for record in records]
 
 
-@pytest.mark.parametrize(("speed", "seconds", "own_ephemerides"), [(0.0, SECONDS, False), (20.0, 40, True)])
+@pytest.mark.parametrize(
+    ("speed", "seconds", "own_ephemerides"),
+    [(0.0, SECONDS, False), (20.0, 40, True), pytest.param(0.0, 3000, False, marks=pytest.mark.campaign)],
+)
 def test_live_nodes_give_the_bits_of_the_offline_chain(
     launcher: Any, probe: Any, files: dict[str, Any], speed: float, seconds: int, own_ephemerides: bool
 ) -> None:
@@ -100,15 +104,17 @@ def test_live_nodes_give_the_bits_of_the_offline_chain(
     events, fixes = probe.events(), probe.listen(topics.AIRBORNE_FIX, NavSatFix)
     scalars = {name: probe.listen(topic, Float64) for name, topic in SCALARS.items()}
     services = probe.listen(topics.AIRBORNE_SERVICE, UInt8)
-    start_chain(launcher, own_ephemerides, recorders=1)  # the probe is a recorder of all outputs of the chain
+    # The probe is a recorder of all outputs of the chain. It is slower than the nodes, so the replay must wait for it.
+    probe.report_progress(topics.AIRBORNE_PROTECTION)
+    start_chain(launcher, own_ephemerides, recorders=1)
     if own_ephemerides:
         files = {**files, "user_nav_files": list(files["nav_files"])}
-    replay = launcher.start(REPLAY, {**files, "speed": speed, "stop_s": float(seconds), "start_wait_s": 60.0})
+    replay = launcher.start(REPLAY, {**files, "speed": speed, "stop_s": float(seconds), **WAITING})
     expected = offline(files, slice(0, seconds + 1))
     ground = [each for each in expected if isinstance(each, GroundOutput)]
     airborne = [each for each in expected if isinstance(each, AirborneOutput)]
 
-    probe.until(lambda: any(event.kind is EventKind.FINISHED for event in events), "the end of the replay", 120.0)
+    probe.until(lambda: any(event.kind is EventKind.FINISHED for event in events), "the end of the replay", 300.0)
     assert replay.wait() == 0, replay.output
     last = (protections, fixes, services, *scalars.values())
     probe.until(lambda: min(map(len, last)) >= len(airborne), "the last protection level")
