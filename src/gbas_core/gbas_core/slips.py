@@ -305,7 +305,10 @@ def _clock_step(epoch: _Epoch, params: SlipParams) -> tuple[_Epoch, FloatArray]:
     A clock that steps forward reads a given time earlier: the interval is shorter by the step.
     """
     rate_mps = np.where(np.isfinite(epoch.predicted_mps), epoch.predicted_mps, epoch.doppler_mps)
-    common_m, _ = _common(epoch.code_m - rate_mps * epoch.dt_s, params.min_satellites)
+    surprise_m = epoch.code_m - rate_mps * epoch.dt_s
+    if not (np.abs(surprise_m) > CLOCK_STEP_M).any():  # then their median is none either
+        return epoch, np.zeros(len(surprise_m))
+    common_m, _ = _common(surprise_m, params.min_satellites)
     step_m = np.where(np.abs(common_m) > CLOCK_STEP_M, common_m, 0.0)
     return epoch._replace(dt_s=epoch.dt_s - step_m / SPEED_OF_LIGHT_MPS), step_m[:, 0, 0]
 

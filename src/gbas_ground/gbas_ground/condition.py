@@ -61,7 +61,7 @@ def conclude(
         (~visible, excluded, ExclusionCause.BELOW_MASK),
         (exclusions.satellites.excluded, excluded, exclusions.satellites.cause),
         (waiting, ChannelState.SETTLING, ExclusionCause.SETTLING),
-        (short & (channel_cause >= FIRST_LATCHED), excluded, channel_cause),
+        (short & (channel_cause >= float(FIRST_LATCHED)), excluded, channel_cause),
         (short & (ready >= params.min_receivers), excluded, ExclusionCause.TOO_FEW_COMMON_SATELLITES),
         (short, excluded, ExclusionCause.TOO_FEW_RECEIVERS),
         (~_sigma_fits(made), excluded, ExclusionCause.SIGMA_TOO_LARGE),
@@ -84,7 +84,8 @@ def _channel_cause(tracked: BoolArray, exclusions: Exclusions) -> FloatArray:
 
 
 def _sigma_fits(made: Corrections) -> BoolArray:
-    return np.asarray(np.all([(sigma > 0.0) & (sigma <= MAX_SIGMA_M) for sigma in made.sigmas], axis=0))
+    sigmas = np.array(made.sigmas)
+    return np.asarray(((sigmas > 0.0) & (sigmas <= MAX_SIGMA_M)).all(axis=0))
 
 
 def integrity_of(

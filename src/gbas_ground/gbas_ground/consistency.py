@@ -236,6 +236,8 @@ def _worst_b_value(made: Corrections, exclusions: Exclusions, params: GroundPara
 def _worst_limit(made: Corrections, exclusions: Exclusions, params: GroundParams) -> _Step | None:
     best: tuple[float, ExclusionCause, MonitorResult, tuple[int, ...]] | None = None
     for cause, result in limit_checks(made, params):
+        if not result.failed.any():
+            continue
         ratio = np.where(exclusions.satellites.excluded, 0.0, _ratio(result))
         place = tuple(int(each) for each in np.unravel_index(int(ratio.argmax()), ratio.shape))
         if ratio[place] > (best[0] if best else 0.0):

@@ -23,16 +23,18 @@ _IDENTITY = ("message", "iod", "toe_week", "toe_tow_s", "toc_tow_s", "af0_s", "m
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class EphemerisState:
-    """Ephemerides received, the ones in use, and their CRCs ``(N,)``."""
+    """Ephemerides received, the ones in use, what tells these from others, and their CRCs ``(N,)``."""
 
     store: EphemerisStore
     current: Ephemeris
+    identity: FloatArray
     crc: FloatArray
 
 
 def initial_ephemerides() -> EphemerisState:
     """Nothing received."""
-    return EphemerisState(store=EphemerisStore(), current=Ephemeris(gps_week=0, tow_s=0.0), crc=missing())
+    none = Ephemeris(gps_week=0, tow_s=0.0)
+    return EphemerisState(store=EphemerisStore(), current=none, identity=_identity(none), crc=missing())
 
 
 def _only(ephemeris: Ephemeris, satellites: BoolArray) -> Ephemeris:
@@ -76,7 +78,7 @@ def choose(
         The changes from one ephemeris to the next, with the new issue of data as value.
     """
     current = state.store.usable(gps_week, tow_s, params.ephemeris_settle_s)
-    before, now = _identity(state.current), _identity(current)
+    before, now = state.identity, _identity(current)
     present, was_present = np.isfinite(now[0]), np.isfinite(before[0])
     same = (before == now).all(axis=0)
     changed = present & ~same
@@ -91,7 +93,7 @@ def choose(
             )
             for satellite in map(int, np.flatnonzero(changed & was_present))
         )  # fmt: skip
-    return EphemerisState(store=state.store, current=current, crc=crc), changed, events
+    return EphemerisState(store=state.store, current=current, identity=now, crc=crc), changed, events
 
 
 def _identity(ephemeris: Ephemeris) -> FloatArray:

@@ -23,6 +23,7 @@ from gbas_core.smoothing import SmoothingParams, SmoothingState, initial_smoothi
 from gbas_ground.corrections import BoolArray
 from gbas_ground.params import GroundParams
 
+_OBSERVED: Final = ("code_m", "carrier_m", "doppler_hz", "cn0_dbhz", "lli")
 _MAX_LLI: Final = 9  # one decimal digit in RINEX
 _NO_SMOOTHING_TAU_S: Final = 1e-9  # far below any interval: the filter's weight is 1 and its output the raw code
 
@@ -41,12 +42,13 @@ class RawEpoch(NamedTuple):
 
 def stack(observations: Sequence[ObservationEpoch | None], satellites: BoolArray) -> RawEpoch:
     """Bring the receivers' records of one epoch together; nonsense and satellites not in use become missing."""
-    nothing = missing(N_BANDS)
-    arrays = []
-    for name in ("code_m", "carrier_m", "doppler_hz", "cn0_dbhz", "lli"):
-        values = np.stack([nothing if each is None else getattr(each, name) for each in observations])
-        arrays.append(np.where((np.abs(values) <= LARGEST_OBSERVATION) & satellites, values, np.nan))
-    code, carrier, doppler, cn0, lli = arrays
+    values = missing(len(_OBSERVED), len(observations), N_BANDS)
+    for row, each in enumerate(observations):
+        if each is not None:
+            for place, name in enumerate(_OBSERVED):
+                values[place, row] = getattr(each, name)
+    sensible = (np.abs(values) <= LARGEST_OBSERVATION) & satellites
+    code, carrier, doppler, cn0, lli = np.where(sensible, values, np.nan)
     lli = np.where((lli < 0.0) | (lli > _MAX_LLI), 1.0, lli)  # an indicator that means nothing counts as lock lost
     present = np.array([each is not None for each in observations])
     return RawEpoch(code, carrier, doppler, cn0, lli, present)
