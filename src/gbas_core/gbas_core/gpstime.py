@@ -78,7 +78,8 @@ def seconds_between(week_a: float, tow_a_s: float, week_b: float, tow_b_s: float
 def seconds_between(week_a: ArrayLike, tow_a_s: ArrayLike, week_b: ArrayLike, tow_b_s: ArrayLike) -> FloatArray: ...
 def seconds_between(week_a: ArrayLike, tow_a_s: ArrayLike, week_b: ArrayLike, tow_b_s: ArrayLike) -> float | FloatArray:
     """Time from `a` to `b` [s] (b less a), across weeks; numbers, or arrays that broadcast. NaN stays NaN."""
-    if isinstance(tow_a_s, float) and isinstance(tow_b_s, float) and isinstance(week_a, int) and isinstance(week_b, int):
+    weeks_are_numbers = isinstance(week_a, int) and isinstance(week_b, int)
+    if weeks_are_numbers and isinstance(tow_a_s, float) and isinstance(tow_b_s, float):
         return float((week_b - week_a) * SECONDS_PER_WEEK + (tow_b_s - tow_a_s))
     weeks = np.subtract(week_b, week_a, dtype=np.float64)
     seconds = weeks * SECONDS_PER_WEEK + np.subtract(tow_b_s, tow_a_s, dtype=np.float64)

@@ -51,10 +51,10 @@ def conclude(
     short = made.count < params.min_receivers
     waiting = short & (ready < params.min_receivers) & (ready + settling >= params.min_receivers)
     channel_cause = _channel_cause(tracked, exclusions)
-    no_rate = np.asarray(~np.isfinite(made.prc_m + made.rrc_mps).all(axis=0))
+    no_rate = ~np.isfinite(made.prc_m + made.rrc_mps).all(axis=0)
 
     excluded = ChannelState.EXCLUDED
-    reasons: tuple[tuple[BoolArray, ChannelState, ArrayLike], ...] = (
+    reasons: tuple[tuple[BoolArray | np.bool, ChannelState, ArrayLike], ...] = (
         (~seen & ~visible, ChannelState.NOT_TRACKED, ExclusionCause.NONE),
         (~seen, ChannelState.NOT_TRACKED, ExclusionCause.NOT_TRACKED),
         (np.isnan(measured.elevation_rad + known.crc), excluded, ExclusionCause.NO_EPHEMERIS),
