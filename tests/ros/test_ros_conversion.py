@@ -221,7 +221,7 @@ def test_stamp_is_gps_time_from_the_unix_epoch() -> None:
 
 
 def test_fix_without_a_position_says_so() -> None:
-    fix = ros.fix_from_solution(SolutionEpoch(gps_week=2300, tow_s=1.5))
+    fix = ros.fix_from_solution(SolutionEpoch(gps_week=2300, tow_s=1.5), protected=True)
     assert fix.status.status == NavSatStatus.STATUS_NO_FIX
     assert math.isnan(fix.latitude)
     assert math.isnan(fix.longitude)
@@ -233,7 +233,8 @@ def test_fix_of_a_position() -> None:
     x, y, z = ecef_from_geodetic(math.radians(52.32), math.radians(10.56), 130.0)
     solution = SolutionEpoch(gps_week=2300, tow_s=1.5, x_m=float(x), y_m=float(y), z_m=float(z))
     solution.elevation_rad[[3, 40]] = 0.5
-    fix = ros.fix_from_solution(solution)
+    assert ros.fix_from_solution(solution, protected=False).status.status == NavSatStatus.STATUS_NO_FIX
+    fix = ros.fix_from_solution(solution, protected=True)
     assert fix.status.status == NavSatStatus.STATUS_GBAS_FIX
     assert fix.status.service == NavSatStatus.SERVICE_GPS | NavSatStatus.SERVICE_GALILEO
     assert fix.position_covariance_type == NavSatFix.COVARIANCE_TYPE_UNKNOWN
@@ -242,7 +243,7 @@ def test_fix_of_a_position() -> None:
     assert fix.longitude == pytest.approx(10.56, abs=1e-9)
     assert fix.altitude == pytest.approx(130.0, abs=1e-4)
     part = replace(solution, y_m=math.nan)
-    assert ros.fix_from_solution(part).status.status == NavSatStatus.STATUS_NO_FIX
+    assert ros.fix_from_solution(part, protected=True).status.status == NavSatStatus.STATUS_NO_FIX
 
 
 def test_quality_of_service_is_reliable_and_latched_where_a_late_reader_needs_it() -> None:

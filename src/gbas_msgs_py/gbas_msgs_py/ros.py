@@ -181,8 +181,8 @@ def schemas_msg() -> String:
     return String(data=schema_dictionary())
 
 
-def fix_from_solution(solution: SolutionEpoch, *, frame_id: str = "gbas_antenna") -> NavSatFix:
-    """Position as NavSatFix, for maps and displays.
+def fix_from_solution(solution: SolutionEpoch, *, protected: bool, frame_id: str = "gbas_antenna") -> NavSatFix:
+    """Position as NavSatFix, for maps and displays; no fix where the position has no protection level.
 
     The status says that a position corrected by GBAS exists, never that it may be used for an approach: the service
     type and the protection levels are on their own topics. The covariance is unknown, because the solution table has
@@ -192,7 +192,7 @@ def fix_from_solution(solution: SolutionEpoch, *, frame_id: str = "gbas_antenna"
     fix.header.stamp = stamp_of(solution.gps_week, solution.tow_s)
     fix.header.frame_id = frame_id
     position = np.array([solution.x_m, solution.y_m, solution.z_m])
-    valid = bool(np.isfinite(position).all())
+    valid = protected and bool(np.isfinite(position).all())
     fix.status.status = NavSatStatus.STATUS_GBAS_FIX if valid else NavSatStatus.STATUS_NO_FIX
     fix.position_covariance_type = NavSatFix.COVARIANCE_TYPE_UNKNOWN
     fix.latitude = fix.longitude = fix.altitude = math.nan

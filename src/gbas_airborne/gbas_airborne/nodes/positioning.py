@@ -6,8 +6,6 @@ from collections.abc import Iterable
 from functools import partial
 from typing import Any
 
-from sensor_msgs.msg import NavSatFix
-
 from gbas_airborne.nodes.configuration import receiver_params
 from gbas_airborne.receiver import AirborneEpoch, AirborneReceiver, PositionState
 from gbas_core.gpstime import epoch_key, from_epoch_key
@@ -15,7 +13,6 @@ from gbas_core.observations import ObservationEpoch
 from gbas_msgs_py import tables, topics
 from gbas_msgs_py.joining import AirborneInput, AirborneJoiner
 from gbas_msgs_py.node import GbasNode, JoiningParams, run
-from gbas_msgs_py.ros import fix_from_solution
 from gbas_msgs_py.vdb.burst import Burst
 
 
@@ -30,7 +27,6 @@ class Positioning(GbasNode):
             correction_wait_s=self.receiver.correction_wait_s, timeout_s=self.params.join_timeout_s
         )
         self.solution = self.table_publisher(topics.AIRBORNE_SOLUTION, tables.SOLUTION, readers=1)
-        self.fix = self.message_publisher(NavSatFix, topics.AIRBORNE_FIX)
         self.publish_schemas()
         self.ephemerides = self.ephemeris_queue()
         self.burst_subscription(topics.VDB, self.on_burst)
@@ -65,8 +61,6 @@ class Positioning(GbasNode):
         )
         self.state, solution, events = AirborneReceiver.position(self.state, epoch, self.receiver)
         self.solution.publish(solution)
-        if self.fix.get_subscription_count():
-            self.fix.publish(fix_from_solution(solution))
         self.publish_events(events)
         self.finished_epoch(week, tow_s)
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from functools import partial
 from typing import Any
+
+from sensor_msgs.msg import NavSatFix
 
 from gbas_airborne.nodes.configuration import receiver_params
 from gbas_airborne.receiver import AirborneReceiver
@@ -12,6 +15,7 @@ from gbas_msgs_py import tables, topics
 from gbas_msgs_py.events import Event, EventKind
 from gbas_msgs_py.node import ConfiguredParams, GbasNode, run
 from gbas_msgs_py.records import ServiceType, SolutionEpoch
+from gbas_msgs_py.ros import fix_from_solution
 
 
 class ProtectionLevel(GbasNode):
@@ -24,6 +28,7 @@ class ProtectionLevel(GbasNode):
         self.service_told = int(ServiceType.NONE)
         self.protection = self.table_publisher(topics.AIRBORNE_PROTECTION, tables.PROTECTION)
         self.service = self.uint8_publisher(topics.AIRBORNE_SERVICE)
+        self.fix = self.message_publisher(NavSatFix, topics.AIRBORNE_FIX)
         self.scalars = {
             "vpl_m": self.float_publisher(topics.AIRBORNE_VPL),
             "lpl_m": self.float_publisher(topics.AIRBORNE_LPL),
@@ -42,6 +47,9 @@ class ProtectionLevel(GbasNode):
             publish(getattr(protection, name))
         self.service_told = int(protection.service)
         self.service(self.service_told)
+        if self.fix.get_subscription_count():
+            protected = math.isfinite(protection.vpl_m + protection.lpl_m)
+            self.fix.publish(fix_from_solution(solution, protected=protected))
         self.publish_events(events)
         self.finished_epoch(solution.gps_week, solution.tow_s)
 
