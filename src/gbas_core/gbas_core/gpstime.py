@@ -61,7 +61,7 @@ def calendar_text(week: int, tow_s: float) -> str:
 def normalised(week: int, tow_s: float) -> tuple[int, float]:
     """The same instant with ``0 <= tow_s < 604800``."""
     weeks = math.floor(tow_s / SECONDS_PER_WEEK)
-    remainder = tow_s - weeks * SECONDS_PER_WEEK
+    remainder = max(tow_s - weeks * SECONDS_PER_WEEK, 0.0)  # the smallest negative numbers divide to zero weeks
     if remainder >= SECONDS_PER_WEEK:  # a tiny negative time of week rounds up to a whole week
         return int(week) + weeks + 1, 0.0
     return int(week) + weeks, remainder
