@@ -35,8 +35,9 @@ GPS_START_UNIX_S = 315964800  # 1980-01-06, as a Unix time
 
 
 @pytest.fixture
-def domain() -> int:
-    """A ROS domain in which nothing else runs."""
+def domain(monkeypatch: pytest.MonkeyPatch) -> int:
+    """A ROS domain in which nothing else runs; nodes of the test itself keep to this machine as well."""
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     return free_domain()
 
 

@@ -145,3 +145,16 @@ def test_configuration_by_name() -> None:
     assert named_config("braunschweig") == named_config("braunschweig.yaml") == config_path("braunschweig.yaml")
     with pytest.raises(ConfigError, match="it is none of"):
         named_config("berlin")
+
+
+def test_further_files_of_the_nodes_go_into_the_bag(tmp_path: Path) -> None:
+    """A node may read its station from a file of its own; a replay needs it as it was."""
+    own = REPLAY + "/gbas/positioning: {ros__parameters: {config: receiver.yaml}}\n"
+    config = read_run_config(written(tmp_path, own)).with_nodes()
+    assert config.files == {"/gbas/positioning": "receiver.yaml"}
+    recorder = launch_parameters(RunPlan(config=config, directory=tmp_path))["/gbas/recorder"]
+    assert recorder["config_files"] == [str(tmp_path / "run.yaml"), "receiver.yaml"]
+    copies = {"/gbas/positioning": {"config": "copy/receiver.yaml"}}
+    replayed = launch_parameters(RunPlan(config=config, directory=tmp_path, overrides=copies))
+    assert replayed["/gbas/recorder"]["config_files"] == [str(tmp_path / "run.yaml"), "copy/receiver.yaml"]
+    assert replayed["/gbas/positioning"]["config"] == "copy/receiver.yaml"

@@ -26,6 +26,8 @@ from gbas_core.gpstime import from_epoch_key
 
 SUITE_METADATA: Final = "gbas"
 CONFIGURATION_METADATA: Final = "gbas.configuration"
+MAIN_CONFIGURATION: Final = "configuration"
+"""Key of the suite's metadata: which of the configuration files starts the nodes."""
 END_METADATA: Final = "gbas.end"
 RECOVERY_METADATA: Final = "gbas.recovery"
 _NOT_COPIED: Final = frozenset({"rosbag2", END_METADATA})

@@ -107,7 +107,7 @@ def launch_parameters(plan: RunPlan) -> dict[str, dict[str, Any]]:
         if node.kind.stage is not Stage.RECORDER:
             values["recorders"] = len(recorders)
         else:
-            values |= {"out": str(plan.bag_path), "command": plan.command, "config_files": [str(config.path)]}
+            values |= {"out": str(plan.bag_path), "command": plan.command, "config_files": _config_files(plan)}
         if node.kind.name in _JOINING and _speed(plan, driver) != 1.0 and not config.given(node, "join_timeout_s"):
             values["join_timeout_s"] = BATCH_JOIN_TIMEOUT_S
         if node == driver:
@@ -116,14 +116,17 @@ def launch_parameters(plan: RunPlan) -> dict[str, dict[str, Any]]:
     return parameters
 
 
+def _config_files(plan: RunPlan) -> list[str]:
+    """Every configuration file the nodes read, the one that starts them first."""
+    further = {plan.overrides.get(name, {}).get("config", file) for name, file in plan.config.files.items()}
+    return [str(plan.config.path), *sorted(further)]
+
+
 def _speed(plan: RunPlan, driver: NodeInstance) -> float:
     if plan.speed is not None:
         return plan.speed
-    sections = plan.config.parameters
-    for name in (driver.full_name, f"/**/{driver.kind.name}", "/**"):
-        if "speed" in sections.get(name, {}):
-            return float(sections[name]["speed"])
-    return 1.0
+    configured = plan.config.value(driver, "speed")
+    return 1.0 if configured is None else float(configured)
 
 
 def _driver_parameters(plan: RunPlan, recorders: Sequence[NodeInstance]) -> dict[str, Any]:

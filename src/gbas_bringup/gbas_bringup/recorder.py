@@ -21,7 +21,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 from gbas_bringup import __version__, epochs
-from gbas_bringup.bags import CONFIGURATION_METADATA, END_METADATA, SUITE_METADATA
+from gbas_bringup.bags import CONFIGURATION_METADATA, END_METADATA, MAIN_CONFIGURATION, SUITE_METADATA
 from gbas_bringup.capture import Capture, Taken
 from gbas_bringup.data_time import DataTime
 from gbas_bringup.definitions import definition, qos_record
@@ -59,7 +59,7 @@ class RecorderParams(NodeParams):
     exclude : str
         Regular expression of topics not to record; empty for none.
     config_files : tuple of str
-        Configuration files whose text goes into the bag.
+        Configuration files whose text goes into the bag, the one that starts the nodes first.
     command : str
         Command line that started it all.
     log_time : str
@@ -109,12 +109,16 @@ def suite_metadata(command: str, config_files: Sequence[str]) -> dict[str, dict[
         "command": command,
         "python": platform.python_version(),
     }
-    files = {}
-    for name in config_files:
+    files: dict[str, str] = {}
+    for path in map(Path, config_files):
+        if path.name in files:
+            raise ConfigError(path, "another configuration file of the run has the same name, and a bag keeps one")
         try:
-            files[Path(name).name] = Path(name).read_text(encoding="utf-8")
+            files[path.name] = path.read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError) as error:
-            raise ConfigError(name, f"cannot be read: {error}") from error
+            raise ConfigError(path, f"cannot be read: {error}") from error
+    if files:
+        about[MAIN_CONFIGURATION] = next(iter(files))
     return {
         SUITE_METADATA: about,
         CONFIGURATION_METADATA: files,

@@ -100,7 +100,7 @@ def replay(request: ReplayRequest) -> ReplayResult:
         single_process=request.single_process,
         domain=free_domain() if request.domain is None else request.domain,
         isolated=True,
-        overrides={player.full_name: {"bag": str(request.bag)}},
+        overrides={player.full_name: {"bag": str(request.bag)}, **_stored_files(config, request)},
         command=request.command,
     )
     execute(plan, title=f"replaying {request.bag}", verbose=request.verbose, quiet=request.quiet, total=epochs)
@@ -145,6 +145,14 @@ def _configuration(request: ReplayRequest, metadata: dict[str, dict[str, str]]) 
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in stored.items():
         (folder / Path(name).name).write_text(text, encoding="utf-8")
-    if len(stored) != 1:
-        raise BagError(request.bag, f"holds {len(stored)} configurations ({', '.join(stored)}); choose with --config")
-    return read_run_config(folder / Path(next(iter(stored))).name)
+    main = metadata.get(bags.SUITE_METADATA, {}).get(bags.MAIN_CONFIGURATION, next(iter(stored)))
+    if main not in stored:
+        raise BagError(request.bag, f"its configuration {main} is not stored in it; give one with --config")
+    return read_run_config(folder / Path(main).name)
+
+
+def _stored_files(config: RunConfig, request: ReplayRequest) -> dict[str, dict[str, Any]]:
+    """Files that nodes read, as they were when the bag was recorded."""
+    folder = request.out / CONFIGURATION_FOLDER
+    copies = {name: folder / Path(file).name for name, file in config.files.items()}
+    return {name: {"config": str(copy)} for name, copy in copies.items() if copy.is_file()}
