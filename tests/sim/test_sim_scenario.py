@@ -116,7 +116,10 @@ def test_dotted_keys_and_files_say_the_same(tmp_path):
             {"ground_receiver": {"noise_scale": -1.0}},
             r"sim\.ground_receiver: receiver: noise_scale = -1\.0 is not within",
         ),
-        ({"airborne_receiver": {"spacing_chips": [0.1]}}, r"sim\.airborne_receiver\.spacing_chips = \[0\.1\] has not 2 values"),
+        (
+            {"airborne_receiver": {"spacing_chips": [0.1]}},
+            r"sim\.airborne_receiver\.spacing_chips = \[0\.1\] has not 2 values",
+        ),
         ({"airborne_receiver": {"elevation_mask_rad": 0.1}}, r"elevation_mask_rad is unknown"),
         ({"troposphere": {"humidity": 1.0}}, r"sim\.troposphere\.humidity is unknown"),
         ({"troposphere": {"refractivity": -1.0}}, r"troposphere: refractivity = -1\.0 is not within"),

@@ -167,29 +167,34 @@ def recorded_orbits(
         start = f"week {gps_week}, {tow_s:g} s"
         raise RinexError(navigation.paths[0], f"{navigation.describe()}; nothing is valid at the start, {start}")
     start_s = gps_week * SECONDS_PER_WEEK + tow_s
-    # Slots around even hours: GPS times of ephemeris are even hours.
-    first = round(start_s / RENEWAL_S)
-    centres = [RENEWAL_S * each for each in range(first, round((start_s + duration_s) / RENEWAL_S) + 1)]
-    truth = tuple(_nearest(navigation, centre_s, systems) for centre_s in centres)
+    # Satellites change over at even hours, when GPS begins to send the ephemeris of the end of the two hours to come.
+    slots = range(int(start_s // RENEWAL_S), int((start_s + duration_s) // RENEWAL_S) + 1)
+    truth = tuple(_of_slot(navigation, RENEWAL_S * slot, systems) for slot in slots)
     last_key = epoch_key(gps_week, tow_s) + round(duration_s * 1000.0)
     heard = navigation.received(gps_week, tow_s)
     received = [each for each in heard if epoch_key(each.gps_week, each.tow_s) <= last_key]
     return Orbits(
         truth=truth,
-        switch_s=tuple(centre_s + 0.5 * RENEWAL_S for centre_s in centres[:-1]),
+        switch_s=tuple(RENEWAL_S * slot for slot in slots[1:]),
         received=tuple(_only(replace(each, simulated=1.0), systems) for each in received),
     )
 
 
-def _nearest(navigation: NavigationFile, centre_s: float, systems: NDArray[np.bool_]) -> Ephemeris:
-    """The record nearest to a time of each satellite, if valid in the slot around it."""
-    away_s = np.abs(navigation.toe_s - centre_s)
+def _of_slot(navigation: NavigationFile, start_s: float, systems: NDArray[np.bool_]) -> Ephemeris:
+    """The record of each satellite that is in use in the two hours from a time on, if there is a valid one.
+
+    GPS satellites send an ephemeris before its time, Galileo satellites after it, and new ones every ten minutes, of
+    which that of the middle is taken.
+    """
+    middle_s = start_s + 0.5 * RENEWAL_S
+    wanted_s = np.where(IS_GPS[navigation.satellite], start_s + RENEWAL_S, middle_s)
+    away_s = np.abs(navigation.toe_s - wanted_s)
     values = np.full((len(FIELDS), N_SATS), np.nan)
     for row in np.argsort(-away_s, kind="stable"):
         satellite = navigation.satellite[row]
         if systems[satellite] and away_s[row] <= VALIDITY_S[satellite]:
             values[:, satellite] = navigation.values[row]
-    week, tow_s = from_epoch_key(round(centre_s * 1000.0))
+    week, tow_s = from_epoch_key(round(middle_s * 1000.0))
     columns: dict[str, Any] = dict(zip(FIELDS, values, strict=True))
     return Ephemeris(gps_week=week, tow_s=tow_s, simulated=1.0, **columns)
 
@@ -226,7 +231,7 @@ def renewed(truth: Ephemeris, toe_week: int, toe_tow_s: float) -> Ephemeris:
         "af0_s": truth.af0_s + truth.af1_sps * since_clock_s,
     }
     present = np.isfinite(truth.sqrt_a)
-    issue = np.where(present, issue_of(toe_tow_s), np.nan)
+    issue = np.where(present, issue_of(toe_week, toe_tow_s), np.nan)
     times: dict[str, Any] = {f"{which}_{part}": np.where(present, value, np.nan) for which in ("toe", "toc")
              for part, value in (("week", float(toe_week)), ("tow_s", toe_tow_s))}  # fmt: skip
     elements: dict[str, Any] = quantised_fields({name: getattr(truth, name) for name in FIELDS} | fields)

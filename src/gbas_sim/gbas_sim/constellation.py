@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from gbas_core.ephemeris import Ephemeris, NavigationMessage
 from gbas_core.frames import EARTH_RATE_RADPS, GM_GALILEO_M3PS2, GM_GPS_M3PS2
-from gbas_core.gpstime import add_seconds, gps_from_calendar, seconds_between
+from gbas_core.gpstime import SECONDS_PER_WEEK, add_seconds, gps_from_calendar, seconds_between
 from gbas_core.record import FloatArray
 from gbas_core.satellites import IS_GPS, N_GPS, N_SATS, missing
 
@@ -211,7 +211,7 @@ def nominal_ephemeris(gps_week: int, tow_s: float, *, seed: int, systems: NDArra
     slots = nominal_slots(toe_week, toe_tow_s)
     present = np.isfinite(slots.semi_major_m) & systems
     fields = _orbit_fields(slots, toe_tow_s) | _clock_fields(seed)
-    issue = issue_of(toe_tow_s)
+    issue = issue_of(toe_week, toe_tow_s)
     fields |= {
         "message": np.where(IS_GPS, float(NavigationMessage.GPS_LNAV), float(NavigationMessage.GALILEO_INAV)),
         "iod": np.full(N_SATS, issue),
@@ -233,9 +233,9 @@ def time_of_ephemeris(gps_week: int, tow_s: float) -> tuple[int, float]:
     return add_seconds(gps_week, 0.0, round(tow_s / _TOE_GRID_S) * _TOE_GRID_S)
 
 
-def issue_of(toe_tow_s: float) -> float:
+def issue_of(toe_week: int, toe_tow_s: float) -> float:
     """Issue of data of an ephemeris; another for each within 13 hours."""
-    return float(int(toe_tow_s // _TOE_GRID_S) % 200)
+    return float((toe_week * round(SECONDS_PER_WEEK / _TOE_GRID_S) + int(toe_tow_s // _TOE_GRID_S)) % 200)
 
 
 def group_delays_s(seed: int) -> dict[str, FloatArray]:
