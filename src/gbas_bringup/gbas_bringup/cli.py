@@ -290,7 +290,7 @@ def process(
 def bench(
     part: Annotated[
         list[str] | None,
-        typer.Option(help="Only this: steps, offline, process, latency, replay or files; may be repeated."),
+        typer.Option(help="Only this: steps, simulator, offline, process, latency, replay or files; may be repeated."),
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Short runs: less exact.")] = False,
     seconds: Annotated[float | None, typer.Option(help="Duration of the latency run (default: 40).")] = None,
@@ -493,15 +493,10 @@ def _print_places(places: dict[str, Path]) -> None:
         print(f"{name:{width}}  {path}")
 
 
-def _print_summary(summary: dict[str, Any], indent: str = "") -> None:
-    for name, value in summary.items():
-        if isinstance(value, dict):
-            print(f"{indent}{name}:")
-            _print_summary(value, indent + "  ")
-        elif isinstance(value, list):
-            print(f"{indent}{name}: {', '.join(str(item) for item in value) or 'none'}")
-        else:
-            print(f"{indent}{name}: {f'{value:.3f}' if isinstance(value, float) else value}")
+def _print_summary(summary: dict[str, Any]) -> None:
+    from gbas_bringup.results import summary_lines
+
+    print("\n".join(summary_lines(summary)))
 
 
 def _print_table(title: str, headings: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from gbas_core.frames import geodetic_from_ecef, rot_enu_ecef
+from gbas_core.gpstime import calendar_text
 from gbas_msgs_py.records import ProtectionEpoch, ServiceType, SolutionEpoch
 
 SOLUTION_HEADER = (
@@ -194,6 +195,39 @@ def summarise(rows: Sequence[Row]) -> dict[str, Any]:
         "vpl_m_min_median_max": _three(vpl),
         "lpl_m_min_median_max": _three(lpl),
     }
+
+
+def summary_lines(summary: dict[str, Any]) -> list[str]:
+    """A summary as a person reads it."""
+    total, solved = summary["epochs"], summary["epochs_solved"]
+    lines = [f"epochs       {total}{_span(summary['first_epoch'], summary['last_epoch'])}"]
+    if not solved:
+        return [*lines, "positions    none with a protection level"]
+    service = ", ".join(f"{name} in {count}" for name, count in summary["service_epochs"].items())
+    low, high = summary["satellites_min_max"]
+    lines += [
+        f"positions    {solved}, from {calendar_text(*summary['first_solved_epoch'])[11:19]} on; service {service}",
+        f"satellites   {low} to {high}",
+        f"VPL, LPL     median {summary['vpl_m_min_median_max'][1]:.2f} m, {summary['lpl_m_min_median_max'][1]:.2f} m; "
+        f"largest {summary['vpl_m_min_median_max'][2]:.2f} m, {summary['lpl_m_min_median_max'][2]:.2f} m",
+    ]
+    errors = summary.get("errors", {})
+    if errors.get("epochs"):
+        lines += [
+            f"errors       {errors['horizontal_rms_m']:.3f} m rms horizontal, {errors['vertical_rms_m']:.3f} m rms vertical",
+            f"protected    vertical error within VPL in {errors['vertical_bounded_epochs']} of {errors['epochs']}, "
+            f"lateral within LPL in {errors['lateral_bounded_epochs']}; "
+            f"worst error/PL {max(errors['vertical_worst_ratio'], errors['lateral_worst_ratio']):.3f}",
+        ]
+    if summary.get("simulated"):
+        lines.append("data         simulated")
+    return lines
+
+
+def _span(first: list[Any] | None, last: list[Any] | None) -> str:
+    if first is None or last is None:
+        return ""
+    return f", {calendar_text(*first)[:19]} to {calendar_text(*last)[11:19]} (GPS time)"
 
 
 def _three(values: Sequence[float]) -> list[float] | None:
