@@ -30,10 +30,11 @@ from typing import Any, Final
 from gbas_bringup.bench_figures import Part, document, environment
 from gbas_bringup.errors import GbasError
 
-PARTS: Final = ("steps", "offline", "process", "latency", "replay", "files")
+PARTS: Final = ("steps", "simulator", "offline", "process", "latency", "replay", "files")
 LATENCY_S: Final = 40.0
 QUICK_LATENCY_S: Final = 8.0
 _STEP_EPOCHS: Final = (300, 60)
+_WORLD_EPOCHS: Final = (1000, 100)
 _REPLAY_EPOCHS: Final = (1200, 300)
 _BUSY_LOAD: Final = 0.5
 
@@ -91,12 +92,13 @@ def run_bench(
 
 def _measures(out: Path, quick: bool, seconds: float | None, data: Path | None) -> Mapping[str, Callable[[], Part]]:
     """What measures each part; the libraries are loaded when they are needed."""
-    from gbas_bringup import bench_live, bench_offline, bench_peer
+    from gbas_bringup import bench_live, bench_offline, bench_peer, bench_sim
 
     step_epochs = bench_offline.SETTLE_EPOCHS + _STEP_EPOCHS[quick]
     latency_s = seconds if seconds is not None else QUICK_LATENCY_S if quick else LATENCY_S
     return {
         "steps": lambda: bench_offline.measure_steps(bench_offline.make_flight(step_epochs)),
+        "simulator": lambda: bench_sim.measure_worlds(_WORLD_EPOCHS[quick]),
         "offline": lambda: bench_offline.measure_chain(bench_offline.make_flight(step_epochs)),
         "process": lambda: bench_peer.measure_process(data, repeats=1 if quick else 3),
         "latency": lambda: bench_live.measure_latency(out / "latency", seconds=latency_s),
