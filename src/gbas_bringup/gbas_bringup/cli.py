@@ -231,6 +231,8 @@ def replay(
     else:
         for topic in result.topics:
             print(topic.verdict())
+            if topic.explanation():
+                print(f"  {topic.explanation()}")
         _print_places({"bag": result.replayed})
     if not result.identical:
         raise typer.Exit(EXIT_INTERNAL)

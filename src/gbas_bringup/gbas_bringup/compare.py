@@ -58,6 +58,16 @@ class TopicComparison:
         rest = [f"{count} {what}" for what, count in counts if count]
         return f"{text}; {', '.join(rest)}" if rest else text
 
+    def explanation(self) -> str:
+        """Where the first difference is, for a person; empty without one."""
+        if self.first_difference is None:
+            return ""
+        found = self.first_difference
+        text = f"the first difference is at {found['gps_week']} {found['tow_s']:.3f}"
+        if "difference" in found:
+            text += f", largest in {found['column']}: {found['recorded']!r} became {found['replayed']!r}"
+        return f"{text}: {found['what']}" if "what" in found else text
+
 
 def compare(recorded: Path, replayed: Path) -> list[TopicComparison]:
     """Compare the outputs in two bags, topic by topic, the most important first.
