@@ -28,6 +28,8 @@ from gbas_bringup.node_kinds import NodeInstance, Stage
 from gbas_bringup.run_config import RunConfig, one_driver
 
 OVERRIDES_FILE: Final = "overrides.yaml"
+START_WAIT_S: Final = 60.0
+"""A node that does not come up is noticed here at once, so a driver need not be impatient on a busy machine [s]."""
 BATCH_JOIN_TIMEOUT_S: Final = 30.0
 """Join time-out of a run that is not in real time: no deadline must pass because the machine is busy."""
 _JOINING: Final = frozenset({"integrity_monitor", "positioning"})
@@ -141,6 +143,8 @@ def _driver_parameters(plan: RunPlan, recorders: Sequence[NodeInstance]) -> dict
         for name, nodes in readers.items()
         if not config.given(driver, name)
     }
+    if not config.given(driver, "start_wait_s"):
+        values["start_wait_s"] = START_WAIT_S
     if plan.speed is not None:
         values["speed"] = float(plan.speed)
     return values
@@ -277,7 +281,7 @@ class Launcher:
     def _watch(self) -> None:
         while True:
             if self._signals:
-                raise Interrupted("interrupted; the nodes were ended in order")
+                raise Interrupted(f"interrupted; the nodes were ended in order{self._where_the_bag_is()}")
             for running in self._running:
                 code = running.process.poll()
                 if code is None:
@@ -288,6 +292,10 @@ class Launcher:
             if self._on_tick is not None:
                 self._on_tick()
             time.sleep(_POLL_S)
+
+    def _where_the_bag_is(self) -> str:
+        recorded = any(node.kind.stage is Stage.RECORDER for node in self.plan.config.nodes)
+        return f"; the bag is {self.plan.bag_path}" if recorded else ""
 
     def _died(self, running: _Running, code: int) -> None:
         if running.reader is not None:
