@@ -13,8 +13,9 @@ replay      live nodes with a recorder, data as fast as they are taken, against 
 files       the same with recorded receiver files
 ==========  ===========================================================================================================
 
-The live parts start each node as its own process. Wall times hold for this machine with what else runs on it: look at
-the load in the header before and after. Processor times are much less sensitive to that.
+The live parts start each node as its own process. Wall times and speeds hold for this machine with what else runs on
+it: look at the load in the header before and after. Processor times suffer less, but programs that share a core's
+caches make them longer too, by half on a machine with three times as much to do as it has cores.
 """
 
 from __future__ import annotations
