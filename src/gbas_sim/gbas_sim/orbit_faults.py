@@ -67,7 +67,8 @@ def displaced(state: SatelliteState, faults: Sequence[SatelliteFault], since_s: 
 
     Notes
     -----
-    The axes turn with the satellite; the velocity has their rates. The clock stays as it is.
+    The axes turn with the satellite in its plane, which is taken to stand still among the stars; the velocity has their
+    rates. The clock stays as it is.
     """
     of_orbits = [fault for fault in faults if isinstance(fault, OrbitFault)]
     if not of_orbits:
