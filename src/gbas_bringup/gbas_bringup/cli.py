@@ -77,7 +77,10 @@ def _new_out(out: Path | None, stem: str) -> Path:
 @app.command()
 def demo(
     out: Annotated[Path | None, typer.Option(help="Folder for what is written (default: out/demo-N).")] = None,
-    config: Annotated[Path | None, typer.Option(help="Configuration with a simulator and an approach.")] = None,
+    config: Annotated[
+        str | None,
+        typer.Option(metavar="CONFIG", help="A simulated approach: a .yaml file, or a name as for `gbas run`."),
+    ] = None,
     speed: Speed = "max",
     single_process: SingleProcess = False,
     verbose: Verbose = False,
@@ -85,10 +88,11 @@ def demo(
 ) -> None:
     """Fly one simulated approach through running nodes; write a bag, a table and a picture."""
     from gbas_bringup import demo as body
+    from gbas_bringup.resources import named_config
 
     result = body.demo(
         _new_out(out, "demo"),
-        config=config,
+        config=None if config is None else named_config(config),
         speed=speed_of(speed),
         single_process=single_process,
         verbose=verbose,
