@@ -67,10 +67,9 @@ def demo(
     GbasError
         When the run fails.
     """
-    path = config or config_path(DEMO_CONFIG)
-    directory.mkdir(parents=True, exist_ok=True)
+    run_config = read_run_config(config or config_path(DEMO_CONFIG)).with_nodes().written(directory)
     plan = RunPlan(
-        config=read_run_config(path).with_nodes(),
+        config=run_config,
         directory=directory,
         speed=speed,
         single_process=single_process,
@@ -79,11 +78,12 @@ def demo(
         command=command,
     )
     execute(plan, title="approach", verbose=verbose, quiet=quiet)
-    return report_bag(plan.bag_path, directory, config=path)
+    return report_bag(plan.bag_path, directory, config=run_config.path)
 
 
 def report_bag(bag: Path, directory: Path, *, config: Path) -> DemoResult:
-    """Write table, summary and picture of a recorded approach."""
+    """Write table, summary and picture of a recorded approach, flown with the (whole) configuration `config`."""
+    directory.mkdir(parents=True, exist_ok=True)
     records = read_records(bag, (_SOLUTION, _PROTECTION, _TRUTH))
     protections = {_key(item): item for item in records[_PROTECTION] if isinstance(item, ProtectionEpoch)}
     pairs = [
