@@ -71,7 +71,7 @@ def test_interrupt_leaves_a_good_bag(run: Callable[..., Run], options: tuple[str
     process.popen.send_signal(signal.SIGINT)
     code, _, err = process.end()
     assert code == 130
-    assert err.splitlines()[-1] == "gbas: interrupted; the nodes were ended in order"
+    assert err.splitlines()[-1] == f"gbas: interrupted; the nodes were ended in order; the bag is {process.bag}"
     result = check(process.bag)
     assert result.ok, [str(problem) for problem in result.problems]
     document = info(process.bag).as_json()

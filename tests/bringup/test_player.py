@@ -105,7 +105,8 @@ def test_comparison_finds_one_bit(fake_bag: Any, tmp_path: Path) -> None:
     assert (found.recorded, found.identical, found.different, found.missing, found.extra) == (40, 38, 1, 1, 0)
     assert found.first_difference is not None
     assert found.first_difference["column"] == "x_m"
-    assert found.explanation().startswith("the first difference is at 2400 345602.500, largest in x_m: 3840005.0 became")
+    where = "the first difference is at 2400 345602.500, largest in x_m: 3840005.0 became "
+    assert found.explanation().startswith(where)
     assert found.verdict() == "38 of 40 solutions identical bit for bit; 1 different, 1 missing"
     assert results[protection].same
     assert results[protection].extra == 1
