@@ -43,7 +43,7 @@ GROUND = {
 def fly(refractivity=379.0, **sim):
     """Errors in the approach frame (epochs, 3) [m], services, levels and distances to the threshold of an approach."""
     ground = GROUND | {"atmosphere": GROUND["atmosphere"] | {"refractivity": refractivity}}
-    flight = {"level_time_s": 190.0, "intercept_distance_m": 5000.0}
+    flight = {"level_time_s": 220.0, "intercept_distance_m": 5000.0}
     world = World(scenario_from_mapping({"ground": ground, "sim": {"flight": flight, **sim}}))
     chain = Chain(
         GroundParams.from_mapping(ground),
@@ -87,7 +87,7 @@ def test_without_noise_the_position_is_the_truth(refractivity, reach_m, bound_m)
 def test_with_noise_the_protection_levels_hold():
     errors, service, levels, _ = fly()
     served = service == ServiceType.C
-    # Corrections begin 200 s after the start.
+    # Corrections begin 230 s after the start.
     assert served.mean() > 0.2
     assert (np.abs(errors[served][:, 1]) < levels[served, 0]).all()
     assert (np.abs(errors[served][:, 2]) < levels[served, 1]).all()
