@@ -73,7 +73,7 @@ def test_two_receivers_38_m_apart_agree(upc):
     integrity, events = upc
     state = stacked(integrity, "state")
     usable = state == ChannelState.USABLE
-    assert usable[201:].sum(axis=1).min() >= 7
+    assert usable[231:].sum(axis=1).min() >= 7
     assert not usable[:230].any()  # filters settle for 230 s
     assert not [event for event in events if event.cause in ("b_value", "receiver_fault", "prc_limit", "rrc_limit")]
 
