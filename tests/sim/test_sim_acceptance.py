@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import multiprocessing
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -395,3 +396,32 @@ def test_files_based_on_others(tmp_path):
     (tmp_path / "top.yaml").write_text("base: none.yaml\n")
     with pytest.raises(ScenarioError, match="none.yaml: cannot be read"):
         read_sections(tmp_path / "top.yaml")
+
+
+# --- long runs
+
+
+def test_a_day_takes_no_more_memory_than_an_hour():
+    """Allocations after 300 epochs and after as many more, spread over the day; less than 1 MB is kept between."""
+    path = next(path for path in SCENARIOS if path.stem == "station_day")
+    world = world_from_yaml(path)
+    step = len(world) // 600
+    tracemalloc.start()
+    for number in range(0, 300 * step, step):
+        world.epoch(number)
+    before, _ = tracemalloc.get_traced_memory()
+    for number in range(300 * step, 600 * step, step):
+        world.epoch(number)
+    after, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert after - before < 1e6
+
+
+def test_satellites_rise_and_set_in_a_day():
+    path = next(path for path in SCENARIOS if path.stem == "station_day")
+    world = world_from_yaml(path)
+    seen = np.array([np.isfinite(world.epoch(number).ground[0].code_m[L1]) for number in range(0, len(world), 900)])
+    assert len(seen) == 49  # one each half hour, both ends
+    assert seen.any(axis=0).sum() >= 44  # nearly all of 48 pass over a place at 52 degrees within a day
+    assert not seen.all(axis=0).any()
+    assert seen.sum(axis=1).min() >= 10
