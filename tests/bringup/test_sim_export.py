@@ -43,7 +43,9 @@ def test_exported_files_go_through_gbas_process(tmp_path: Path) -> None:
     gbas("sim", "export", scenario(tmp_path), "--rinex", tmp_path, "--json")
     ground = tuple(tmp_path / f"rr{number}.obs" for number in (1, 2, 3, 4))
     request = ProcessRequest(ground=ground, user=tmp_path / "airborne.obs", navigation=(tmp_path / "broadcast.nav",))
-    assert len(process(request).rows) == 13
+    result = process(request)
+    assert len(result.rows) == 13
+    assert result.summary()["simulated"] is True
 
 
 @pytest.mark.parametrize(

@@ -144,6 +144,8 @@ def test_files_say_that_they_are_simulated(tmp_path):
     for path in (*files.observations, files.navigation, files.truth):
         assert LABEL in path.read_text()
     assert "simulated" in files.truth.read_text().splitlines()[1]
+    assert read_observations(files.observations[0]).epoch(0).simulated == 1.0
+    assert all(each.simulated == 1.0 for each in read_navigation([files.navigation]).received(2400, 216_000.0))
 
 
 def test_files_are_clean(tmp_path):

@@ -16,6 +16,7 @@ from gbas_bringup.resources import config_path
 from gbas_bringup.results import Row, summarise, write_json, write_solution_csv
 from gbas_core.frames import geodetic_from_ecef
 from gbas_core.recording import RecordedEpoch, Recording
+from gbas_core.rinex import NavigationFile, ObservationFile
 from gbas_ground.params import GroundParams, ground_section
 from gbas_msgs_py.events import Event, EventKind
 from gbas_studies.chain import AirborneOutput, Chain
@@ -78,6 +79,8 @@ class ProcessResult:
     airborne : AirborneParams
     run_file : dict
         The same run as a ROS parameter file for ``gbas run``.
+    simulated : bool
+        Whether any of the files says that it is simulated.
     """
 
     rows: tuple[Row, ...]
@@ -87,6 +90,7 @@ class ProcessResult:
     ground: GroundParams
     airborne: AirborneParams
     run_file: dict[str, Any]
+    simulated: bool = False
 
     def summary(self) -> dict[str, Any]:
         """Body of ``summary.json``."""
@@ -95,7 +99,7 @@ class ProcessResult:
             "events": _event_counts(self.events),
             "notes": list(self.notes),
             "station": {"id": self.ground.station_id, "designator": self.ground.accuracy_designator},
-            "simulated": False,
+            "simulated": self.simulated,
         }
 
 
@@ -170,7 +174,14 @@ def process(request: ProcessRequest, *, progress: Progress | None = None) -> Pro
         ground=prepared.ground,
         airborne=prepared.airborne,
         run_file=prepared.run_file,
+        simulated=any(file.simulated for file in _files(prepared.recording)),
     )
+
+
+def _files(recording: Recording) -> tuple[ObservationFile | NavigationFile, ...]:
+    """All files of a recording."""
+    user = () if recording.user is None else (recording.user,)
+    return (*recording.ground, *user, recording.navigation, recording.user_navigation)
 
 
 def write_results(result: ProcessResult, out: Path) -> dict[str, Any]:

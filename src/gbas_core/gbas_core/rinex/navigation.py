@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from gbas_core.ephemeris import FIELDS, VALIDITY_S, Ephemeris, NavigationMessage
 from gbas_core.gpstime import SECONDS_PER_WEEK, calendar_text, from_epoch_key
 from gbas_core.record import FloatArray
-from gbas_core.rinex.text import PathLike, RinexError, checked_version, parser_problem, read_text
+from gbas_core.rinex.text import PathLike, RinexError, checked_version, parser_problem, read_text, says_simulated
 from gbas_core.satellites import IS_GPS, N_SATS, SAT_INDEX
 
 IntArray = NDArray[np.int64]
@@ -179,7 +179,7 @@ def read_navigation(
     galileo : {"inav", "fnav"}
         Message to take for Galileo; a satellite that has only the other gets the other.
     simulated : bool
-        Marks the ephemerides as made by a simulator.
+        Marks the ephemerides as made by a simulator, as files do whose header says so.
 
     Returns
     -------
@@ -207,7 +207,8 @@ def read_navigation(
     if not files:
         raise ValueError("paths: no navigation file given")
     notes: list[str] = []
-    records = [row for path in files for row in _records_of(path, notes)]
+    parts = [_records_of(path, notes) for path in files]
+    records = [row for rows, _ in parts for row in rows]
     if not records:
         raise RinexError(", ".join(map(str, files)), "has no GPS LNAV or Galileo record; expected at least one")
     satellite = np.array([row[0] for row in records], dtype=np.int64)
@@ -222,13 +223,13 @@ def read_navigation(
         satellite=satellite,
         values=values,
         transmitted_s=transmitted,
-        simulated=simulated,
+        simulated=simulated or any(labelled for _, labelled in parts),
         notes=tuple(notes),
     )
 
 
-def _records_of(path: Path, notes: list[str]) -> list[tuple[int, list[float], float]]:
-    """Satellite, field values and transmission time of each usable record of one file."""
+def _records_of(path: Path, notes: list[str]) -> tuple[list[tuple[int, list[float], float]], bool]:
+    """Satellite, field values and transmission time of each usable record of one file; whether it is simulated."""
     own_notes: list[str] = []
     text = read_text(path, own_notes)
     version = checked_version(path, text, "N", "a RINEX navigation file")
@@ -251,7 +252,7 @@ def _records_of(path: Path, notes: list[str]) -> list[tuple[int, list[float], fl
     if mixed:
         own_notes.append(f"{mixed} GPS records have an IODC that does not go with their IODE and will not be used")
     notes += [f"{path}: {note}" for note in own_notes]
-    return rows
+    return rows, says_simulated(text)
 
 
 def _record_values(record: Any) -> tuple[int, list[float], float]:

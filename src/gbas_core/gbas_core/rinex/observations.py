@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from gbas_core.gpstime import MILLISECONDS_PER_WEEK, calendar_text, epoch_key, from_epoch_key, gps_from_calendar
 from gbas_core.observations import ObservationEpoch
 from gbas_core.record import FloatArray
-from gbas_core.rinex.text import PathLike, RinexError, checked_version, parser_problem, read_text
+from gbas_core.rinex.text import SIMULATED_LABEL, PathLike, RinexError, checked_version, parser_problem, read_text
 from gbas_core.satellites import N_SATS, SAT_INDEX
 from gbas_core.signals import BAND_INDEX, BANDS, N_BANDS, WAVELENGTH_M
 
@@ -149,7 +149,7 @@ def read_observations(
         taken per system and band: the first that has code and carrier, and at least half as many observations as the
         best of the listed ones. If none has both, code and carrier come from the first that has each.
     simulated : bool
-        Marks the observations as made by a simulator.
+        Marks the observations as made by a simulator, as files do whose header says so.
 
     Returns
     -------
@@ -200,7 +200,7 @@ def read_observations(
         cn0_dbhz=arrays[_CN0],
         lli=arrays[_LLI],
         signals=chosen,
-        simulated=simulated,
+        simulated=simulated or any(comment.startswith(SIMULATED_LABEL) for comment in header.comments),
         notes=tuple(notes),
     )
 

@@ -14,6 +14,9 @@ _GZIP_MAGIC: Final = b"\x1f\x8b"
 _COMPRESS_MAGIC: Final = b"\x1f\x9d"
 
 
+SIMULATED_LABEL: Final = "SIMULATED DATA"
+
+
 class RinexError(ValueError):
     """A RINEX file that cannot be used; the text names the file, the place, what is there and what was expected."""
 
@@ -92,6 +95,12 @@ def checked_version(path: Path, text: str, letter: str, expected: str) -> float:
     if line[20:21].upper() != letter:
         raise RinexError(path, f"line 1: file type {line[20:40].strip()!r}; expected {expected}")
     return version
+
+
+def says_simulated(text: str) -> bool:
+    """Whether a comment of the header begins with :data:`SIMULATED_LABEL`: the suite's own mark on simulated files."""
+    header = text.partition("END OF HEADER")[0]
+    return any(line.startswith(SIMULATED_LABEL) and line[60:].startswith("COMMENT") for line in header.splitlines())
 
 
 def parser_problem(text: str, error: Exception) -> str:
