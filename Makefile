@@ -30,7 +30,7 @@ demo: $(READY)  ## fly one approach, write a bag and a report, print where they 
 	@$(RUN) gbas demo $(ARGS)
 
 test: $(READY)  ## run every test but the campaigns (ARGS="-k name" to choose)
-	@$(RUN) python -m pytest $(ARGS)
+	@$(RUN) python -m pytest -n 2 --dist loadfile $(ARGS)
 
 campaign: $(READY)  ## run the long tests
 	@$(RUN) python -m pytest -m campaign $(ARGS)
