@@ -20,18 +20,23 @@ be left out::
       troposphere: {refractivity: 379.0, scale_height_m: 7900.0, reference_height_m: 130.0}
       ionosphere: {day_delay_m: 4.5, sigma_vig: 4.0e-6}             # left out: none
       scintillation: {equatorial_s4: 0.7, loss_rate_hz: 0.02}       # left out: none
+      scene: {ground: wet_ground, antenna: mla, antenna_height_m: 3.0}      # reflections; left out: none
       ground_receiver: {elevation_mask_deg: 3.0, cn0_zenith_dbhz: [50.0, 52.0], noise_scale: 1.0}
       airborne_receiver: {preset: aad_b, rinex_steps: true}
       threats:                      # any number, each with a name of its own
         wedge: {kind: front, gradient: 300.0e-6, width_m: 50000.0, speed_mps: 100.0, direction_deg: 45.0}
+        hangar: {kind: building, east_m: 90.0, north_m: 40.0, length_m: 60.0, width_m: 40.0, height_m: 15.0}
 
 A flight with ``segments`` or ``profile`` is one by the equations of motion, see :mod:`gbas_sim.flight_dynamics.keys`.
 Without a refractivity from either, there is no troposphere. A receiver with a ``preset`` is one of
-:mod:`gbas_sim.presets`; then its other keys are :data:`PRESET_KEYS`. Fields and bounds of sections are those of
+:mod:`gbas_sim.presets`; then its other keys are :data:`PRESET_KEYS`, among them those of its loops
+(``tracking: {spacing_chips: [0.1, 0.1, 1.0]}``, see :class:`~gbas_sim.tracking.TrackingParams`), its delays
+(``hardware``, :class:`~gbas_sim.oscillators.HardwareParams`) and its clock (``oscillator``, a name in
+:data:`~gbas_sim.oscillators.OSCILLATORS`). Fields and bounds of sections are those of
 :class:`~gbas_sim.world.WorldParams`, :class:`~gbas_sim.flight.StraightIn`, :class:`~gbas_sim.troposphere.Troposphere`,
-:class:`~gbas_sim.ionosphere.IonosphereParams`, :class:`~gbas_sim.scintillation.ScintillationParams` and
-:class:`~gbas_sim.receivers.ReceiverParams`; those of threats are of the classes in :data:`THREATS`, by their ``kind``.
-Angles are degrees in files only.
+:class:`~gbas_sim.ionosphere.IonosphereParams`, :class:`~gbas_sim.scintillation.ScintillationParams`,
+:class:`~gbas_sim.site_scene.SceneParams` and :class:`~gbas_sim.receivers.ReceiverParams`; those of threats are of the
+classes in :data:`THREATS`, by their ``kind``. Angles are degrees in files only.
 """
 
 from __future__ import annotations
@@ -50,16 +55,19 @@ from gbas_core.approach import FinalApproach
 from gbas_core.approach_keys import approach_from_mapping
 from gbas_core.frames import ecef_from_geodetic
 from gbas_core.rinex import RinexError
+from gbas_sim.bounds import one_of
 from gbas_sim.faults import RECEIVER_FAULTS, SATELLITE_FAULTS
 from gbas_sim.flight import StraightIn
 from gbas_sim.flight_dynamics import flight_from_mapping
 from gbas_sim.fronts import PlasmaBubble, WedgeFront
 from gbas_sim.ionosphere import IonosphereParams
 from gbas_sim.keys import keys_of, record_from_keys
+from gbas_sim.oscillators import OSCILLATORS
 from gbas_sim.presets import receiver_preset
 from gbas_sim.receiver_model import ReceiverModel
 from gbas_sim.receivers import AIRBORNE_RECEIVER, GROUND_RECEIVER, ReceiverParams
 from gbas_sim.scintillation import ScintillationParams
+from gbas_sim.site_scene import Building, SceneParams
 from gbas_sim.troposphere import Troposphere, WeatherBox
 from gbas_sim.world import FlightPath, World, WorldParams
 
@@ -73,18 +81,22 @@ _WORLD_KEYS: Final[dict[str, type]] = {
 }
 _OTHER_KEYS: Final[dict[str, type]] = {"aircraft": bool, "approach": str}
 _RECEIVERS: Final = {"ground_receiver": GROUND_RECEIVER, "airborne_receiver": AIRBORNE_RECEIVER}
-_SECTIONS: Final = ("constellation", "flight", "troposphere", "ionosphere", "scintillation", "threats", *_RECEIVERS)
+_ATMOSPHERE: Final = ("troposphere", "ionosphere", "scintillation")
+_SECTIONS: Final = ("constellation", "flight", *_ATMOSPHERE, "scene", "threats", *_RECEIVERS)
 _SITE_TROPOSPHERE: Final = {
     "refractivity": "atmosphere.refractivity",
     "scale_height_m": "atmosphere.scale_height_m",
     "reference_height_m": "station.height_m",
 }
 _DYNAMIC: Final = ("aircraft", "configuration", "mass_kg", "planned_wind", "profile", "segments", "start", "wind")
-PRESET_KEYS: Final = ("cn0_sigma_db", "elevation_mask_deg", "preset", "rinex_steps")
+PRESET_KEYS: Final = (
+    "cn0_sigma_db", "elevation_mask_deg", "hardware", "oscillator", "preset", "rinex_steps", "tracking",
+)  # fmt: skip
 THREATS: Final[dict[str, tuple[type[Any], str]]] = {
     "front": (WedgeFront, "fronts"),
     "bubble": (PlasmaBubble, "fronts"),
     "weather": (WeatherBox, "weather"),
+    "building": (Building, "buildings"),
     **{kind: (made, "faults") for kind, made in (SATELLITE_FAULTS | RECEIVER_FAULTS).items()},
 }
 """Class of each kind of threat, and the field of :class:`~gbas_sim.world.WorldParams` it goes to."""
@@ -217,7 +229,7 @@ def scenario_values(world: WorldParams, mapping: Mapping[str, Any]) -> dict[str,
     values["sim.aircraft"] = world.flight is not None
     if isinstance(world.flight, StraightIn):
         values |= keys_of(world.flight, "sim.flight.")
-    sections = {name: getattr(world, name) for name in ("troposphere", "ionosphere", "scintillation")}
+    sections = {name: getattr(world, name) for name in (*_ATMOSPHERE, "scene")}
     sections |= {"ground_receiver": world.ground, "airborne_receiver": world.airborne}
     for name, record in sections.items():
         if record is not None:
@@ -247,9 +259,10 @@ def _world(ground: dict[str, Any], sim: dict[str, Any]) -> WorldParams:
     given = {key: _value(f"sim.{key}", value, _WORLD_KEYS | _OTHER_KEYS) for key, value in plain.items()}
     aircraft, approach = given.pop("aircraft", True), given.pop("approach", None)
     receivers = {name: _receiver(name, parts[name], given.get("interval_s", 0.5)) for name in _RECEIVERS}
-    atmosphere = {
+    optional = {
         "ionosphere": _optional(IonosphereParams, parts["ionosphere"], "sim.ionosphere."),
         "scintillation": _optional(ScintillationParams, parts["scintillation"], "sim.scintillation."),
+        "scene": _optional(SceneParams, parts["scene"], "sim.scene."),
     }
     return WorldParams(
         receiver_ecef_m=_sites(ground),
@@ -258,7 +271,7 @@ def _world(ground: dict[str, Any], sim: dict[str, Any]) -> WorldParams:
         troposphere=_troposphere(ground, parts["troposphere"]),
         ground=receivers["ground_receiver"],
         airborne=receivers["airborne_receiver"],
-        **atmosphere,
+        **optional,
         **_constellation(parts["constellation"]),
         **_threats(parts["threats"]),
         **given,
@@ -350,14 +363,24 @@ def _receiver(name: str, section: dict[str, Any], interval_s: float) -> Receiver
     if "preset" not in section:
         defaults = keys_of(_RECEIVERS[name], "")
         return record_from_keys(ReceiverParams, defaults | section, path)
-    if unknown := sorted(key for key in section if key not in PRESET_KEYS):
+    if unknown := sorted(key for key in section if key.partition(".")[0] not in PRESET_KEYS):
         raise ValueError(f"{path}{unknown[0]} is unknown with a preset; known are {', '.join(PRESET_KEYS)}")
-    kinds: dict[str, type] = {"preset": str, "elevation_mask_deg": float, "cn0_sigma_db": float, "rinex_steps": bool}
-    values = {key: _value(f"{path}{key}", value, kinds) for key, value in section.items()}
+    parts = {part: _section(section, f"{part}.") for part in ("tracking", "hardware")}
+    kinds: dict[str, type] = {"cn0_sigma_db": float, "elevation_mask_deg": float, "rinex_steps": bool}
+    kinds |= {"oscillator": str, "preset": str}
+    plain = {key: value for key, value in section.items() if key.partition(".")[0] not in parts}
+    values = {key: _value(f"{path}{key}", value, kinds) for key, value in plain.items()}
     if "elevation_mask_deg" in values:
         values["elevation_mask_rad"] = math.radians(values.pop("elevation_mask_deg"))
     try:
-        return replace(receiver_preset(values.pop("preset"), interval_s=interval_s), **values)
+        if "oscillator" in values:
+            one_of("receiver", "oscillator", values["oscillator"], OSCILLATORS)
+            values["oscillator"] = OSCILLATORS[values["oscillator"]]
+        preset = receiver_preset(values.pop("preset"), interval_s=interval_s)
+        for part, keys in parts.items():
+            inner = getattr(preset, part)
+            values[part] = record_from_keys(type(inner), keys_of(inner, "") | keys, f"{path}{part}.")
+        return replace(preset, **values)
     except ValueError as error:
         raise ValueError(f"sim.{name}: {error}") from None
 

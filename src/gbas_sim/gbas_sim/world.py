@@ -6,6 +6,7 @@ bits.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
@@ -47,6 +48,7 @@ from gbas_sim.receiver_model import ReceiverModel
 from gbas_sim.receivers import AIRBORNE_RECEIVER, GROUND_RECEIVER, Arrivals, ReceiverBank, ReceiverParams
 from gbas_sim.scintillation import Scintillation, ScintillationParams
 from gbas_sim.sightlines import sightlines, sky
+from gbas_sim.site_scene import Building, SceneParams, SiteScene
 from gbas_sim.troposphere import Troposphere, WeatherBox
 
 MAX_RECEIVERS: Final = 4
@@ -93,6 +95,10 @@ class WorldParams:
     scintillation : ScintillationParams, optional
         None is none.
     faults : tuple of SatelliteFault or ReceiverFault
+    scene : SceneParams, optional
+        Ground that reflects at the reference receivers; None is none.
+    buildings : tuple of Building
+        Around them; on ground that reflects nothing, unless there is a scene.
     ground, airborne : ReceiverParams or ReceiverModel
     systems : str
         ``"G"``, ``"E"`` or ``"GE"``.
@@ -118,6 +124,8 @@ class WorldParams:
     fronts: tuple[WedgeFront | PlasmaBubble, ...] = ()
     scintillation: ScintillationParams | None = None
     faults: tuple[SatelliteFault | ReceiverFault, ...] = ()
+    scene: SceneParams | None = None
+    buildings: tuple[Building, ...] = ()
     ground: ReceiverParams | ReceiverModel = GROUND_RECEIVER
     airborne: ReceiverParams | ReceiverModel = AIRBORNE_RECEIVER
     systems: str = "GE"
@@ -314,10 +322,23 @@ class World:
         self._scintillation = (
             None if params.scintillation is None else Scintillation(params=params.scintillation, seed=params.seed)
         )
+        self._scene = self._site_scene()
         self._instants: dict[int, _Instant] = {}
         kinds = (*(params.ground for _ in numbers), *(() if params.flight is None else (params.airborne,)))
         self._listeners = tuple(_listener(*each) for each in zip(params.receiver_names, kinds, strict=True))
         check_threats(self)
+
+    def _site_scene(self) -> SiteScene | None:
+        params = self.params
+        if params.scene is None and not params.buildings:
+            return None
+        return SiteScene(
+            SceneParams(ground="") if params.scene is None else params.scene,
+            params.buildings,
+            station=params.station,
+            receivers=len(self._sites_m),
+            spacing_chips=_listener(RECEIVERS[0], params.ground).spacing_chips,
+        )
 
     @property
     def ephemeris(self) -> Ephemeris:
@@ -405,7 +426,7 @@ class World:
         seen = sky(arc, np.array(tow_s))
         paths = self._paths(week, tow_s, since_s, clock, seen)
         elevation = np.arcsin(np.clip(paths.sin_elevation, -1.0, 1.0))
-        effect = self._effect(number)
+        effect = self._effect(number, paths)
         change_db, held = self._disturbed(paths, effect)
         cn0, tracked = [], []
         for bank, rows in zip(self._banks, self._rows, strict=True):
@@ -442,16 +463,17 @@ class World:
         since_s = np.full(len(self._listeners), 0.001 * (number * self._interval_ms))
         return Moment(since_s, self.params.interval_s, self._listeners)
 
-    def _effect(self, number: int) -> SignalEffect | None:
-        """What faults do to the signals; None is nothing."""
-        if not self.params.faults:
-            return None
+    def _effect(self, number: int, paths: SignalPaths) -> SignalEffect | None:
+        """What faults and the site's scene do to the signals; None is nothing."""
+        effects = []
+        if self._scene is not None:
+            effects.append(self._scene.effect(paths))
         moment = self._moment(number)
-        effect = signal_effect(self._satellite_faults, moment.since_s, moment.listeners, moment.interval_s)
+        if self._satellite_faults:
+            effects.append(signal_effect(self._satellite_faults, moment.since_s, moment.listeners, moment.interval_s))
         if self._receiver_faults:
-            own = receiver_effect(self._receiver_faults, moment, epoch=number, seed=self.params.seed)
-            effect = effect.plus(own)
-        return effect
+            effects.append(receiver_effect(self._receiver_faults, moment, epoch=number, seed=self.params.seed))
+        return functools.reduce(SignalEffect.plus, effects) if effects else None
 
     def _paths(self, week: int, tow_s: float, since_s: float, clock: ClockState, seen: SatelliteState) -> SignalPaths:
         """Receivers and satellites at the instant; the aircraft is where it is when its clock says so."""
