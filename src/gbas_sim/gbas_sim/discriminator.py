@@ -20,7 +20,7 @@ from gbas_core.record import FloatArray
 
 ComplexArray = NDArray[np.complex128]
 
-_HALVINGS: Final = 3
+_HALVINGS: Final = 4
 _STEPS: Final = 8
 
 
