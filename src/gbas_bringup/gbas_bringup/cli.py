@@ -306,9 +306,9 @@ def bench(
 ) -> None:
     """Measure the speed of the suite on this machine, each figure against a bound or a peer.
 
-    Steps of one epoch, the simulator, the whole chain offline, `gbas process` beside RTKLIB, latency and replay speed of
-    live nodes, each its own process. The ratio says how many times better a figure is than what it is compared with: 1
-    or more meets a bound. Wall times hold for this machine with all that runs on it: see the load in the header.
+    Steps of one epoch, the simulator, the whole chain offline, `gbas process` beside RTKLIB, latency and replay speed
+    of live nodes, each its own process. The ratio says how many times better a figure is than what it is compared with:
+    1 or more meets a bound. Wall times hold for this machine with all that runs on it: see the load in the header.
     """
     from gbas_bringup import bench as body
     from gbas_bringup.progress import progress

@@ -214,7 +214,7 @@ def summary_lines(summary: dict[str, Any]) -> list[str]:
     errors = summary.get("errors", {})
     if errors.get("epochs"):
         lines += [
-            f"errors       {errors['horizontal_rms_m']:.3f} m horizontal, {errors['vertical_rms_m']:.3f} m vertical, rms",
+            f"errors, rms  {errors['horizontal_rms_m']:.3f} m horizontal, {errors['vertical_rms_m']:.3f} m vertical",
             f"protected    vertical error within VPL in {errors['vertical_bounded_epochs']} of {errors['epochs']}, "
             f"lateral within LPL in {errors['lateral_bounded_epochs']}; "
             f"worst error/PL {max(errors['vertical_worst_ratio'], errors['lateral_worst_ratio']):.3f}",
