@@ -183,11 +183,11 @@ def recorded_orbits(
 def _of_slot(navigation: NavigationFile, start_s: float, systems: NDArray[np.bool_]) -> Ephemeris:
     """The record of each satellite that is in use in the two hours from a time on, if there is a valid one.
 
-    GPS satellites send an ephemeris before its time, Galileo satellites after it, and new ones every ten minutes, of
-    which that of the middle is taken.
+    GPS satellites send an ephemeris before its time. Galileo satellites send theirs after it, and new ones every ten
+    minutes, of which that of the start is taken: they describe what comes after them, and badly what was before.
     """
     middle_s = start_s + 0.5 * RENEWAL_S
-    wanted_s = np.where(IS_GPS[navigation.satellite], start_s + RENEWAL_S, middle_s)
+    wanted_s = np.where(IS_GPS[navigation.satellite], start_s + RENEWAL_S, start_s)
     away_s = np.abs(navigation.toe_s - wanted_s)
     values = np.full((len(FIELDS), N_SATS), np.nan)
     for row in np.argsort(-away_s, kind="stable"):
