@@ -32,7 +32,8 @@ class DriverParams(NodeParams):
     speed : float
         Multiple of real time; 0 for as fast as the readers go.
     window_epochs : int
-        Most epochs sent that some reader has not finished with.
+        Most epochs sent that some reader has not finished with. With more of them each node does several at a time (16
+        are up to half as fast again as 8); above 16, the depth of its queue, ``/clock`` may lose messages.
     wait_for : tuple of str
         Readers that report on every epoch with airborne observations: node names, or full names of progress topics.
     wait_for_ground : tuple of str
@@ -43,7 +44,7 @@ class DriverParams(NodeParams):
 
     start_wait_s: float = 20.0
     speed: float = 1.0
-    window_epochs: int = 8
+    window_epochs: int = 16
     wait_for: tuple[str, ...] = ("protection_level",)
     wait_for_ground: tuple[str, ...] = ("correction_broadcast",)
     stall_s: float = 60.0
