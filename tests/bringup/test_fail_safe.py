@@ -444,6 +444,40 @@ def test_damaged_ephemerides_at_length(scenes, case):
     damage_ephemeris(scenes, case)
 
 
+# Changes that pass the 250 m a new ephemeris may move a satellite; by radians, metres and seconds.
+SMALL_CHANGES = {
+    "omega_rad": 5e-6, "cus_rad": 5e-6, "i0_rad": 5e-6, "e": 5e-6, "crs_m": 100.0, "crc_m": 100.0, "idot_radps": 1e-8,
+    "delta_n_radps": 5e-9, "af1_sps": 1e-10, "af2_sps2": 1e-13, "group_delay_s": 2e-7, "omega_dot_radps": 1e-8,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("field", "end"),
+    [
+        ("omega_rad", "ground"),
+        ("cus_rad", "ground"),
+        *(
+            pytest.param(field, end, marks=pytest.mark.campaign)
+            for field in SMALL_CHANGES
+            for end in ("ground", "user", "both")
+        ),
+    ],
+)
+def test_an_ephemeris_that_changes_under_its_issue_of_data(scenes, request, field, end):
+    """Long enough for the filters to settle on the other orbit. Known to one end alone, the CRC has to tell."""
+    scene = scenes["gps"]
+    every = scene.satellites()
+    for satellite in every if request.node.get_closest_marker("campaign") else every[:3]:
+        current = getattr(scene.chain._ground_state.monitor.ephemerides.current, field)
+        bad = one_ephemeris(scene, satellite, 3, **{field: current[satellite] + SMALL_CHANGES[field]})
+        ends = {"both": ("ground", "user")}.get(end, (end,))
+        outcome = safe(scene.run(**{f"{name}_ephemerides": [bad] for name in ends}))
+        if end != "both" and "ephemeris_change" not in outcome.causes():  # the station did not refuse it at once
+            used = np.array([np.isfinite(each.solution.s_vert[satellite]) for each in outcome.airborne])
+            assert not used[80:].any()
+            assert not outcome.alerts().any()
+
+
 @pytest.mark.parametrize("name", ["recorded", "four"])
 @pytest.mark.parametrize("end", ["ground", "user"])
 def test_a_satellite_becomes_unhealthy(scenes, name, end):

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from gbas_core.ephemeris import Ephemeris, EphemerisStore
+from gbas_core.ephemeris import FIELDS, Ephemeris, EphemerisStore
 from gbas_core.record import FloatArray
 from gbas_core.satellites import SAT_IDS, missing
 from gbas_ground.corrections import BoolArray
@@ -17,8 +17,6 @@ from gbas_msgs_py.events import Event, EventKind
 from gbas_msgs_py.vdb.ephemeris_crc import ephemeris_crcs
 
 SOURCE = "ephemerides"
-# Two ephemerides of a satellite are the same when all of these are.
-_IDENTITY = ("message", "iod", "toe_week", "toe_tow_s", "toc_tow_s", "af0_s", "m0_rad", "sqrt_a", "cuc_rad")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -79,8 +77,9 @@ def choose(
     """
     current = state.store.usable(gps_week, tow_s, params.ephemeris_settle_s)
     before, now = state.identity, _identity(current)
-    present, was_present = np.isfinite(now[0]), np.isfinite(before[0])
-    same = (before == now).all(axis=0)
+    present, was_present = np.isfinite(current.message), np.isfinite(state.current.message)
+    # A record that differs anywhere is another one, under the same issue of data too: the CRC must tell the aircraft.
+    same = ((before == now) | (np.isnan(before) & np.isnan(now))).all(axis=0)
     changed = present & ~same
     crc = np.where(present, state.crc, np.nan)
     events: tuple[Event, ...] = ()
@@ -97,4 +96,5 @@ def choose(
 
 
 def _identity(ephemeris: Ephemeris) -> FloatArray:
-    return np.stack([getattr(ephemeris, name) for name in _IDENTITY])
+    """All fields of all satellites, ``(n_fields, N)``."""
+    return np.array([getattr(ephemeris, name) for name in FIELDS])
