@@ -15,6 +15,7 @@ from gbas_airborne.receiver import AirborneEpoch, AirborneReceiver, PositionStat
 from gbas_airborne.service import ServiceState
 from gbas_bringup.bench_figures import Figure, Part
 from gbas_bringup.bench_world import bench_config, bench_world
+from gbas_bringup.errors import GbasError
 from gbas_core.ephemeris import Ephemeris
 from gbas_core.gpstime import from_epoch_key
 from gbas_core.recording import RecordedEpoch
@@ -27,8 +28,8 @@ from gbas_studies.chain import AirborneOutput, Chain
 
 INTERVAL_S: Final = 0.5
 """Interval of the benchmark's epochs: 2 Hz, the rate of the VDB."""
-SETTLE_EPOCHS: Final = 440
-"""Epochs until every satellite is used: 200 s of smoothing, and twenty frames for the ephemeris CRCs."""
+SETTLE_EPOCHS: Final = round((GroundParams.settle_time_s + 30.0) / INTERVAL_S)
+"""Epochs until every satellite is used: those of the filters, and some for the ephemeris CRCs to go round."""
 GROUND_BUDGET_S: Final = 3e-3
 AIRBORNE_BUDGET_S: Final = 2e-3
 VDB_BUDGET_S: Final = 2e-3
@@ -80,6 +81,8 @@ def measure_chain(flight: Flight) -> Part:
         rates.append(len(measured) / (time.perf_counter() - begin_s))
         spent_ms.append(1e3 * (time.process_time() - begin_spent_s) / len(measured))
     used = statistics.median(each.solution.n_sats for each in outputs if isinstance(each, AirborneOutput))
+    if not used > 0:
+        raise GbasError("the benchmark's flight has no positions; nothing to measure")
     rate = statistics.median(rates)
     figure = Figure(
         part="offline",
