@@ -199,7 +199,8 @@ def measure_files(directory: Path, data: Path | None) -> Part:
         "systems": "G", "stop_s": float(_FILE_EPOCHS - 1),
     }  # fmt: skip
     run = run_live(config, directory, speed=0.0, driver=driver)
-    return replace(_speed(run, 1.0, 240, "files", "1+1 recorded receivers at 1 Hz"), about=about)
+    settle = round(SETTLE_EPOCHS * INTERVAL_S)
+    return replace(_speed(run, 1.0, settle, "files", "1+1 recorded receivers at 1 Hz"), about=about)
 
 
 _PROCESSOR_ABOUT: Final = (
