@@ -19,7 +19,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
 _WAIT_NS: Final = 100_000_000
-_GATHER_S: Final = 0.002
+_GATHER_S: Final = 0.010
 """Pause after a batch: the next one is then larger, and cheaper a message."""
 
 
