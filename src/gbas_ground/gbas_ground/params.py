@@ -1,8 +1,7 @@
 """Parameters of a ground station: what it is, what it claims, and when it stops claiming it.
 
 :class:`GroundParams` is frozen and checked when it is made; every complaint names the field as it stands in a
-configuration file, its value and its bound. The same declaration serves the files (:func:`GroundParams.from_yaml`), the
-nodes' parameters and the documentation: each field says in which section it stands, its unit and its bounds.
+configuration file, its value and its bound (:mod:`gbas_ground.declared`).
 
 Where a parameter is part of the integrity claim, its default is the most conservative value the broadcast can carry, or
 the one that withholds service, so that leaving it out is never optimistic.
@@ -15,7 +14,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import MISSING, dataclass, field, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -28,6 +27,7 @@ from gbas_core.frames import ecef_from_geodetic
 from gbas_core.record import FloatArray
 from gbas_core.satellites import SYSTEM_MASKS
 from gbas_ground.approaches import fas_data_set
+from gbas_ground.declared import REQUIRED, Declared, all_specs, arguments_from, flatten, listed, parameter
 from gbas_msgs_py.parameters import ParameterError, unknown_parameters
 from gbas_msgs_py.records import MAX_REFERENCE_RECEIVERS
 from gbas_msgs_py.vdb.block import encode_body
@@ -36,7 +36,6 @@ from gbas_msgs_py.vdb.errors import VdbError
 from gbas_msgs_py.vdb.messages import AdditionalBlock1, AdditionalBlock3, AdditionalBlock4, FasDataSet, Type2, Type4
 from gbas_msgs_py.vdb.schedule import ScheduleParams, sources_that_fit
 
-_KEY: Final = "gbas_parameter"
 _DEGREE: Final = math.pi / 180.0
 ROOT_KEY: Final = "ground"
 GCID_UNHEALTHY: Final = 7
@@ -46,55 +45,24 @@ MIN_SERVICE_SATELLITES: Final = 4
 
 
 @dataclass(frozen=True, kw_only=True)
-class ParameterSpec:
-    """How one field of :class:`GroundParams` stands in a file, and its bounds in the file's unit."""
-
-    section: str
-    name: str
-    unit: str
-    doc: str
-    low: float | None = None
-    high: float | None = None
-    choices: tuple[Any, ...] = ()
-    per_unit: float = 1.0
-
-    @property
-    def key(self) -> str:
-        """Dotted name in a configuration file."""
-        return f"{self.section}.{self.name}"
-
-
-_REQUIRED: Final = object()
-
-
-def _parameter(section: str, name: str, default: Any, unit: str, doc: str, **limits: Any) -> Any:
-    """Declare a parameter; its default is in the file's unit."""
-    spec = ParameterSpec(section=section, name=name, unit=unit, doc=doc, **limits)
-    if default is _REQUIRED:
-        return field(metadata={_KEY: spec})
-    own = default * spec.per_unit if spec.per_unit != 1.0 and not isinstance(default, tuple) else default
-    return field(default=own, metadata={_KEY: spec})
-
-
-@dataclass(frozen=True, kw_only=True)
-class GroundParams:
+class GroundParams(Declared):
     """Everything a ground station has to be told. Units are SI; files use the units of their key names."""
 
     # --- station: what the type 2 message says of the station
-    station_id: str = _parameter("station", "id", _REQUIRED, "-", "GBAS ID, 3 or 4 characters A-Z, 0-9")
-    latitude_rad: float = _parameter(
-        "station", "latitude_deg", _REQUIRED, "deg", "reference point", low=-90.0, high=90.0, per_unit=_DEGREE
+    station_id: str = parameter("station", "id", REQUIRED, "-", "GBAS ID, 3 or 4 characters A-Z, 0-9")
+    latitude_rad: float = parameter(
+        "station", "latitude_deg", REQUIRED, "deg", "reference point", low=-90.0, high=90.0, per_unit=_DEGREE
     )
-    longitude_rad: float = _parameter(
-        "station", "longitude_deg", _REQUIRED, "deg", "reference point", low=-180.0, high=180.0, per_unit=_DEGREE
+    longitude_rad: float = parameter(
+        "station", "longitude_deg", REQUIRED, "deg", "reference point", low=-180.0, high=180.0, per_unit=_DEGREE
     )
-    height_m: float = _parameter(
-        "station", "height_m", _REQUIRED, "m", "reference point above the ellipsoid", low=-1000.0, high=20_000.0
+    height_m: float = parameter(
+        "station", "height_m", REQUIRED, "m", "reference point above the ellipsoid", low=-1000.0, high=20_000.0
     )
-    magnetic_variation_rad: float = _parameter(
+    magnetic_variation_rad: float = parameter(
         "station", "magnetic_variation_deg", 0.0, "deg", "positive east", low=-180.0, high=180.0, per_unit=_DEGREE
     )
-    gcid: int = _parameter(
+    gcid: int = parameter(
         "station",
         "gcid",
         GCID_UNHEALTHY,
@@ -102,73 +70,73 @@ class GroundParams:
         "continuity/integrity designator; 7 is unhealthy",
         choices=(1, 2, 3, 4, 7),
     )
-    rsds: int = _parameter(
+    rsds: int = parameter(
         "station", "rsds", RSDS_NONE, "-", "reference station data selector, 0-48; 255 no positioning service",
         choices=(*range(49), RSDS_NONE),
     )  # fmt: skip
-    max_use_distance_m: float = _parameter(
+    max_use_distance_m: float = parameter(
         "station", "max_use_distance_m", 50_000.0, "m", "D_max; 0 is unlimited", low=0.0, high=510_000.0
     )
-    systems: str = _parameter("station", "systems", "G", "-", "satellite systems corrected: G, E or GE")
+    systems: str = parameter("station", "systems", "G", "-", "satellite systems corrected: G, E or GE")
 
     # --- receivers
-    receiver_ecef_m: tuple[tuple[float, float, float], ...] = _parameter(
-        "receivers", "rr1_ecef_m", _REQUIRED, "m", "antenna positions of the 1 to 4 reference receivers (rr1, rr2, ...)"
+    receiver_ecef_m: tuple[tuple[float, float, float], ...] = parameter(
+        "receivers", "rr1_ecef_m", REQUIRED, "m", "antenna positions of the 1 to 4 reference receivers (rr1, rr2, ...)"
     )
-    min_receivers: int = _parameter(
+    min_receivers: int = parameter(
         "receivers", "minimum", 2, "-", "fewest receivers behind a broadcast correction", low=1, high=4
     )
 
     # --- accuracy
-    accuracy_designator: str = _parameter(
+    accuracy_designator: str = parameter(
         "accuracy", "designator", "A", "-", "ground accuracy designator", choices=("A", "B", "C")
     )
-    sigma_elevation_rad: tuple[float, ...] = _parameter(
+    sigma_elevation_rad: tuple[float, ...] = parameter(
         "accuracy", "sigma_elevation_deg", (), "deg", "nodes of a measured sigma table, rising; empty: the designator",
         low=0.0, high=90.0, per_unit=_DEGREE,
     )  # fmt: skip
-    sigma_table_m: tuple[float, ...] = _parameter(
+    sigma_table_m: tuple[float, ...] = parameter(
         "accuracy", "sigma_m", (), "m", "measured sigma of one receiver's 100 s correction at the nodes",
         low=0.001, high=100.0,
     )  # fmt: skip
-    sigma_inflation: float = _parameter(
+    sigma_inflation: float = parameter(
         "accuracy", "inflation", 1.0, "-", "factor on every sigma (tails, mean errors)", low=1.0, high=100.0
     )
-    sigma_inflation_iono: float = _parameter(
+    sigma_inflation_iono: float = parameter(
         "accuracy", "inflation_iono", 1.0, "-", "further factor on sigma_pr_gnd alone (anomalous ionosphere)",
         low=1.0, high=100.0,
     )  # fmt: skip
-    sigma_30_factor: float = _parameter(
+    sigma_30_factor: float = parameter(
         "accuracy", "factor_30s", math.sqrt(100.0 / 30.0), "-", "sigma of the 30 s corrections over the 100 s ones",
         low=1.0, high=10.0,
     )  # fmt: skip
 
     # --- atmosphere
-    sigma_vert_iono_gradient: float = _parameter(
+    sigma_vert_iono_gradient: float = parameter(
         "atmosphere", "sigma_vert_iono_gradient", 25.5e-6, "m/m", "for the type 2 message", low=0.0, high=25.5e-6
     )
-    sigma_vert_iono_gradient_d: float = _parameter(
+    sigma_vert_iono_gradient_d: float = parameter(
         "atmosphere", "sigma_vert_iono_gradient_d", 25.5e-6, "m/m", "for additional data block 3", low=0.0, high=25.5e-6
     )
-    refractivity: float = _parameter("atmosphere", "refractivity", 400.0, "N", "at the site", low=16.0, high=781.0)
-    refractivity_uncertainty: float = _parameter(
+    refractivity: float = parameter("atmosphere", "refractivity", 400.0, "N", "at the site", low=16.0, high=781.0)
+    refractivity_uncertainty: float = parameter(
         "atmosphere", "refractivity_uncertainty", 255.0, "N", "one sigma", low=0.0, high=255.0
     )
-    scale_height_m: float = _parameter(
+    scale_height_m: float = parameter(
         "atmosphere", "scale_height_m", 7900.0, "m", "of the troposphere", low=100.0, high=25_500.0
     )
 
     # --- ephemeris
-    p_ephemeris: float = _parameter(
+    p_ephemeris: float = parameter(
         "ephemeris", "p", 1.275e-3, "m/m", "decorrelation parameter of the type 1 message", low=0.0, high=1.275e-3
     )
-    p_ephemeris_d: float = _parameter(
+    p_ephemeris_d: float = parameter(
         "ephemeris", "p_d", 1.275e-3, "m/m", "decorrelation parameter of the type 11 message", low=0.0, high=1.275e-3
     )
-    k_md_e_pos: float = _parameter("ephemeris", "k_md_e_pos", 12.75, "-", "positioning service", low=0.0, high=12.75)
-    k_md_e_c: float = _parameter("ephemeris", "k_md_e_c", 12.75, "-", "service type C", low=0.0, high=12.75)
-    k_md_e_d: float = _parameter("ephemeris", "k_md_e_d", 12.75, "-", "service type D", low=0.0, high=12.75)
-    ephemeris_settle_s: float = _parameter(
+    k_md_e_pos: float = parameter("ephemeris", "k_md_e_pos", 12.75, "-", "positioning service", low=0.0, high=12.75)
+    k_md_e_c: float = parameter("ephemeris", "k_md_e_c", 12.75, "-", "service type C", low=0.0, high=12.75)
+    k_md_e_d: float = parameter("ephemeris", "k_md_e_d", 12.75, "-", "service type D", low=0.0, high=12.75)
+    ephemeris_settle_s: float = parameter(
         "ephemeris",
         "settle_s",
         120.0,
@@ -177,33 +145,33 @@ class GroundParams:
         low=0.0,
         high=180.0,
     )
-    ephemeris_max_change_m: float = _parameter(
+    ephemeris_max_change_m: float = parameter(
         "ephemeris", "max_change_m", 250.0, "m", "a new ephemeris further from the last one is not used",
         low=1.0, high=100_000.0,
     )  # fmt: skip
 
     # --- service type D
-    gast_d: bool = _parameter("gast_d", "enabled", False, "-", "broadcast type 11 messages and additional data block 3")
-    y_eig_m: float = _parameter("gast_d", "y_eig_m", 3.0, "m", "ionospheric error at the station", low=0.0, high=3.0)
-    m_eig: float = _parameter("gast_d", "m_eig", 0.7e-3, "m/m", "its growth with distance", low=0.0, high=0.7e-3)
+    gast_d: bool = parameter("gast_d", "enabled", False, "-", "broadcast type 11 messages and additional data block 3")
+    y_eig_m: float = parameter("gast_d", "y_eig_m", 3.0, "m", "ionospheric error at the station", low=0.0, high=3.0)
+    m_eig: float = parameter("gast_d", "m_eig", 0.7e-3, "m/m", "its growth with distance", low=0.0, high=0.7e-3)
 
     # --- vdb
-    slots: str = _parameter("vdb", "slots", "A", "-", "slots assigned, such as AB or ACEG")
-    authentication: bool = _parameter("vdb", "authentication", False, "-", "broadcast additional data block 4")
-    test: bool = _parameter("vdb", "test", False, "-", "mark every message as a test: no guidance from it")
-    period_frames: int = _parameter(
+    slots: str = parameter("vdb", "slots", "A", "-", "slots assigned, such as AB or ACEG")
+    authentication: bool = parameter("vdb", "authentication", False, "-", "broadcast additional data block 4")
+    test: bool = parameter("vdb", "test", False, "-", "mark every message as a test: no guidance from it")
+    period_frames: int = parameter(
         "vdb", "period_frames", 20, "-", "frames within which types 2 and 4 are sent", low=1, high=20
     )
-    occupancy_min: float = _parameter(
+    occupancy_min: float = parameter(
         "vdb", "occupancy_min", 0.95, "-", "filled part of a burst when authenticated", low=0.0, high=1.0
     )
 
     # --- smoothing
-    tau_s: tuple[float, float] = _parameter(
+    tau_s: tuple[float, float] = parameter(
         "smoothing", "tau_s", (100.0, 30.0), "s", "time constants of the two corrections; 0: no smoothing (tests only)",
         low=0.0, high=1000.0,
     )  # fmt: skip
-    settle_time_s: float = _parameter(
+    settle_time_s: float = parameter(
         "smoothing",
         "settle_time_s",
         230.0,
@@ -212,21 +180,21 @@ class GroundParams:
         low=0.0,
         high=3600.0,
     )
-    max_gap_s: float = _parameter(
+    max_gap_s: float = parameter(
         "smoothing", "max_gap_s", 3.5, "s", "longest gap in the data a filter survives", low=0.1, high=3600.0
     )
 
     # --- monitors
-    elevation_mask_rad: float = _parameter(
+    elevation_mask_rad: float = parameter(
         "monitors", "elevation_mask_deg", 5.0, "deg", "lowest elevation corrected", low=5.0, high=60.0, per_unit=_DEGREE
     )
-    min_cn0_dbhz: float = _parameter(
+    min_cn0_dbhz: float = parameter(
         "monitors", "min_cn0_dbhz", 30.0, "dB-Hz", "lowest C/N0 of a channel in use", low=0.0, high=60.0
     )
-    require_cn0: bool = _parameter(
+    require_cn0: bool = parameter(
         "monitors", "require_cn0", True, "-", "do not use a channel whose receiver gives no C/N0"
     )
-    max_range_residual_m: float = _parameter(
+    max_range_residual_m: float = parameter(
         "monitors",
         "max_range_residual_m",
         150.0,
@@ -235,14 +203,14 @@ class GroundParams:
         low=10.0,
         high=10_000.0,
     )
-    max_prc_m: float = _parameter("monitors", "max_prc_m", 327.67, "m", "limit of |PRC|", low=1.0, high=327.67)
-    max_rrc_mps: float = _parameter("monitors", "max_rrc_mps", 3.4, "m/s", "limit of |RRC|", low=0.01, high=32.767)
-    k_b: float = _parameter("monitors", "k_b", 5.5, "-", "multiplier of the B value threshold", low=1.0, high=20.0)
-    receiver_fault_channels: int = _parameter(
+    max_prc_m: float = parameter("monitors", "max_prc_m", 327.67, "m", "limit of |PRC|", low=1.0, high=327.67)
+    max_rrc_mps: float = parameter("monitors", "max_rrc_mps", 3.4, "m/s", "limit of |RRC|", low=0.01, high=32.767)
+    k_b: float = parameter("monitors", "k_b", 5.5, "-", "multiplier of the B value threshold", low=1.0, high=20.0)
+    receiver_fault_channels: int = parameter(
         "monitors", "receiver_fault_channels", 3, "-",
         "channels failing by B values, or by their ranges, that make the receiver the fault", low=1, high=68,
     )  # fmt: skip
-    readmission_time_s: float = _parameter(
+    readmission_time_s: float = parameter(
         "monitors",
         "readmission_time_s",
         60.0,
@@ -251,11 +219,11 @@ class GroundParams:
         low=0.0,
         high=7200.0,
     )
-    min_common_satellites: int = _parameter(
+    min_common_satellites: int = parameter(
         "monitors", "min_common_satellites", 3, "-", "fewest common satellites a constellation is corrected with",
         low=1, high=36,
     )  # fmt: skip
-    clock_weighting: str = _parameter(
+    clock_weighting: str = parameter(
         "monitors",
         "clock_weighting",
         "plain",
@@ -267,9 +235,7 @@ class GroundParams:
     approaches: tuple[FinalApproach, ...] = ()
 
     def __post_init__(self) -> None:
-        for item in fields(self):
-            if _KEY in item.metadata:
-                _check(item.metadata[_KEY], getattr(self, item.name))
+        super().__post_init__()
         _check_station(self)
         _check_receivers(self)
         _check_sigma_table(self)
@@ -388,38 +354,12 @@ def ground_section(document: Any, source: str) -> Mapping[str, Any]:
     return node
 
 
-def parameter_specs() -> tuple[tuple[str, ParameterSpec, Any], ...]:
-    """Field name, specification and default (``dataclasses.MISSING`` when required) of every declared parameter."""
-    return tuple(
-        (item.name, item.metadata[_KEY], item.default) for item in fields(GroundParams) if _KEY in item.metadata
-    )
-
-
-def _flatten(mapping: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    flat: dict[str, Any] = {}
-    for key, value in mapping.items():
-        if isinstance(value, Mapping):
-            flat.update(_flatten(value, f"{prefix}{key}."))
-        else:
-            flat[f"{prefix}{key}"] = value
-    return flat
-
-
 def _arguments(mapping: Mapping[str, Any]) -> dict[str, Any]:
     """Keyword arguments of :class:`GroundParams` from a nested or flat mapping."""
-    flat = _flatten(mapping)
-    arguments: dict[str, Any] = {"approaches": _approaches(flat), "receiver_ecef_m": _receivers(flat)}
-    for item in fields(GroundParams):
-        if _KEY not in item.metadata or item.name in arguments:
-            continue
-        spec: ParameterSpec = item.metadata[_KEY]
-        if spec.key in flat:
-            arguments[item.name] = _from_file(spec, flat.pop(spec.key))
-        elif item.default is not MISSING:
-            continue
-        else:
-            raise ParameterError(f"{spec.key} is missing ({spec.doc})")
-    unknown_parameters(sorted(flat), [spec.key for _, spec, _ in parameter_specs()])
+    flat = flatten(mapping)
+    given = {"approaches": _approaches(flat), "receiver_ecef_m": _receivers(flat)}
+    arguments = arguments_from(GroundParams, flat, given)
+    unknown_parameters(sorted(flat), [spec.key for spec in all_specs(GroundParams)])
     return arguments
 
 
@@ -430,7 +370,7 @@ def _receivers(flat: dict[str, Any]) -> tuple[Any, ...]:
         key = f"receivers.rr{number}_ecef_m"
         if key not in flat:
             break
-        positions.append(_listed(flat.pop(key)))
+        positions.append(listed(flat.pop(key)))
     if beyond := sorted(key for key in flat if re.fullmatch(r"receivers\.rr\d+_ecef_m", key)):
         raise ParameterError(
             f"{beyond[0]} has no place: receivers are rr1 to rr{MAX_REFERENCE_RECEIVERS}, without a gap"
@@ -457,42 +397,6 @@ def _approaches(flat: dict[str, Any]) -> tuple[FinalApproach, ...]:
     return tuple(approaches)
 
 
-def _listed(value: Any) -> Any:
-    """A list of a file or of a ROS parameter as a tuple; anything else as it is."""
-    return tuple(value) if hasattr(value, "__iter__") and not isinstance(value, str | bytes) else value
-
-
-def _from_file(spec: ParameterSpec, value: Any) -> Any:
-    """A file's value in the field's unit; what is not a number is left for the check to refuse."""
-    value = _listed(value)
-    if isinstance(value, tuple):
-        return tuple(_from_file(spec, each) for each in value)
-    if spec.per_unit != 1.0 and isinstance(value, (int, float)) and not isinstance(value, bool):
-        return float(value) * spec.per_unit
-    return value
-
-
-def _check(spec: ParameterSpec, value: Any) -> None:
-    """Refuse a value of the wrong kind or out of its bounds; the message speaks in the file's unit."""
-    if spec.choices:
-        if isinstance(value, bool) or value not in spec.choices:
-            raise ParameterError(f"{spec.key} = {value!r} is not one of {_shortened(spec.choices)}")
-    elif spec.low is not None and spec.high is not None:
-        for each in value if isinstance(value, tuple) else (value,):
-            if isinstance(each, bool) or not isinstance(each, (int, float)):
-                raise ParameterError(f"{spec.key} = {each!r} is not a number")
-            tolerance = 1e-12 * max(abs(spec.low), abs(spec.high))  # of the degrees' conversion
-            shown = each / spec.per_unit
-            if not spec.low - tolerance <= shown <= spec.high + tolerance:
-                raise ParameterError(f"{spec.key} = {shown:g} is not within {spec.low:g} to {spec.high:g} {spec.unit}")
-
-
-def _shortened(choices: tuple[Any, ...]) -> str:
-    if len(choices) > 10:
-        return f"{choices[0]} to {choices[-2]}, {choices[-1]}"
-    return ", ".join(repr(choice) for choice in choices)
-
-
 def _check_station(params: GroundParams) -> None:
     if not isinstance(params.station_id, str) or not re.fullmatch(r"[A-Z0-9]{3,4}", params.station_id):
         raise ParameterError(f"station.id = {params.station_id!r} is not 3 or 4 characters of A-Z, 0-9")
@@ -504,22 +408,6 @@ def _check_station(params: GroundParams) -> None:
         or set(systems) - set(SYSTEM_MASKS)
     ):
         raise ParameterError(f"station.systems = {systems!r} is not one of G, E, GE")
-    for key, value in (
-        ("gast_d.enabled", params.gast_d),
-        ("monitors.require_cn0", params.require_cn0),
-        ("vdb.authentication", params.authentication),
-        ("vdb.test", params.test),
-    ):
-        if not isinstance(value, bool):
-            raise ParameterError(f"{key} = {value!r} is not true or false")
-    for key, count in (
-        ("receivers.minimum", params.min_receivers),
-        ("monitors.receiver_fault_channels", params.receiver_fault_channels),
-        ("monitors.min_common_satellites", params.min_common_satellites),
-        ("vdb.period_frames", params.period_frames),
-    ):
-        if not isinstance(count, int):
-            raise ParameterError(f"{key} = {count!r} is not a whole number")
 
 
 MAX_DISTANCE_FROM_REFERENCE_M: Final = 10_000.0

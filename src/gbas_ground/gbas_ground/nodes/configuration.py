@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import yaml
 
-from gbas_ground.params import GroundParams, ground_section, parameter_specs
+from gbas_ground.params import GroundParams, ground_section
 from gbas_msgs_py.node import GbasNode
 from gbas_msgs_py.parameters import ParameterError
 
-PREFIX = "ground."
+PREFIX: Final = "ground."
+_RECEIVERS: Final = "receivers.rr1_ecef_m"
 
 
 def station_params(node: GbasNode, config: str) -> GroundParams:
@@ -39,15 +40,9 @@ def station_params(node: GbasNode, config: str) -> GroundParams:
 
 
 def _show(node: GbasNode, station: GroundParams) -> None:
-    for name, spec, _ in parameter_specs():
-        if name != "receiver_ecef_m":
-            node.declare_read_only(PREFIX + spec.key, _shown(getattr(station, name), spec.per_unit), spec.doc)
+    for spec, value in station.shown():
+        if spec.key != _RECEIVERS:  # one parameter a receiver, below
+            node.declare_read_only(PREFIX + spec.key, value, spec.doc)
     for number, position in enumerate(station.receiver_ecef_m, start=1):
         key = f"{PREFIX}receivers.rr{number}_ecef_m"
         node.declare_read_only(key, tuple(float(each) for each in position), "antenna position, ECEF [m]")
-
-
-def _shown(value: Any, per_unit: float) -> Any:
-    if isinstance(value, tuple):
-        return tuple(float(each) / per_unit for each in value)
-    return value / per_unit if per_unit != 1.0 else value
