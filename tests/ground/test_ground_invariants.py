@@ -91,7 +91,8 @@ def test_invariants_under_random_damage(ranges, seed, receivers, rate, settle_s)
             observations=damaged(observed[:receivers], rng, rate),
             ephemerides=received if number == 0 else (),
         )
-        state, integrity, bursts, events = GroundStation.step(state, epoch, station)
+        state, monitored, bursts = GroundStation.step(state, epoch, station)
+        integrity, events = monitored.integrity, monitored.events
         check(integrity, station)
         assert not any(decode_burst(burst).errors for burst in bursts)
         assert bursts

@@ -48,7 +48,8 @@ def run(recording, station, first=0, last=None):
         epoch = GroundEpoch(
             gps_week=week, tow_s=tow_s, observations=recorded.ground, ephemerides=queue.take(recorded.key)
         )
-        state, each, _, told = GroundStation.step(state, epoch, station)
+        state, monitored, _ = GroundStation.step(state, epoch, station)
+        each, told = monitored.integrity, monitored.events
         integrity.append(each)
         events.extend(told)
     return integrity, events

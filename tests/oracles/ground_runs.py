@@ -15,7 +15,7 @@ from gbas_core.record import FloatArray
 from gbas_ground.params import GroundParams
 from gbas_ground.station import GroundEpoch, GroundStation, StationState, initial_state
 from gbas_msgs_py.events import Event
-from gbas_msgs_py.records import IntegrityEpoch
+from gbas_msgs_py.records import ChannelEpoch, IntegrityEpoch
 from gbas_msgs_py.vdb.burst import Burst
 from synthetic_ranges import HEIGHT_M, LATITUDE_RAD, LONGITUDE_RAD, TOW_S, WEEK, Truth, receiver_positions_m
 
@@ -48,6 +48,7 @@ class Run:
 
     seconds: list[float]
     integrity: list[IntegrityEpoch]
+    channels: list[ChannelEpoch]
     bursts: list[tuple[Burst, ...]]
     events: list[Event]
     state: StationState
@@ -78,7 +79,7 @@ def run(
     The constellation counts as received long before the start, unless `ephemerides` says what is received when.
     """
     received = {0.0: (_earlier(world.ephemeris),)} if ephemerides is None else ephemerides
-    result = Run([], [], [], [], initial_state(station) if state is None else state)
+    result = Run([], [], [], [], [], initial_state(station) if state is None else state)
     for second in seconds:
         week, tow_s = add_seconds(*start, second)
         carrier = None if carrier_error_m is None else carrier_error_m(second)
@@ -89,11 +90,12 @@ def run(
             observations=change(second, observed),
             ephemerides=received.get(second, ()),
         )
-        result.state, integrity, bursts, events = GroundStation.step(result.state, epoch, station)
+        result.state, monitored, bursts = GroundStation.step(result.state, epoch, station)
         result.seconds.append(second)
-        result.integrity.append(integrity)
+        result.integrity.append(monitored.integrity)
+        result.channels.append(monitored.channels)
         result.bursts.append(bursts)
-        result.events.extend(events)
+        result.events.extend(monitored.events)
     return result
 
 

@@ -54,12 +54,12 @@ def conclude(
     no_rate = ~np.isfinite(made.prc_m + made.rrc_mps).all(axis=0)
 
     excluded = ChannelState.EXCLUDED
-    reasons: tuple[tuple[BoolArray | np.bool, ChannelState, ArrayLike], ...] = (
+    reasons: tuple[tuple[BoolArray | np.bool, ArrayLike, ArrayLike], ...] = (
         (~seen & ~visible, ChannelState.NOT_TRACKED, ExclusionCause.NONE),
         (~seen, ChannelState.NOT_TRACKED, ExclusionCause.NOT_TRACKED),
         (np.isnan(measured.elevation_rad + known.crc), excluded, ExclusionCause.NO_EPHEMERIS),
         (~visible, excluded, ExclusionCause.BELOW_MASK),
-        (exclusions.satellites.excluded, excluded, exclusions.satellites.cause),
+        (exclusions.satellites.excluded, exclusions.satellites.state, exclusions.satellites.cause),
         (waiting, ChannelState.SETTLING, ExclusionCause.SETTLING),
         (short & (channel_cause >= float(FIRST_LATCHED)), excluded, channel_cause),
         (short & (ready >= params.min_receivers), excluded, ExclusionCause.TOO_FEW_COMMON_SATELLITES),
@@ -67,11 +67,11 @@ def conclude(
         (~_sigma_fits(made), excluded, ExclusionCause.SIGMA_TOO_LARGE),
         (no_rate, excluded, ExclusionCause.NO_RATE),
     )
-    state = np.full(N_SATS, float(ChannelState.USABLE))
+    state: FloatArray = np.full(N_SATS, float(ChannelState.USABLE))
     cause = np.zeros(N_SATS)
     for mask, its_state, its_cause in reversed(reasons):
         if mask.any():
-            state = np.where(mask, float(its_state), state)
+            state = np.where(mask, its_state, state)
             cause = np.where(mask, its_cause, cause)
     return Condition(state=state, cause=cause)
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from gbas_core.record import FloatArray
 from gbas_ground.causes import ExclusionCause
 from gbas_ground.corrections import BoolArray
+from gbas_msgs_py.records import ChannelState
 
 IntArray = NDArray[np.int64]
 _NONE = int(ExclusionCause.NONE)  # comparing arrays with members of an enumeration is slow
@@ -40,6 +41,11 @@ class Latch:
     def excluded(self) -> BoolArray:
         """Mask of what is excluded."""
         return np.asarray(self.cause != _NONE)
+
+    @cached_property
+    def state(self) -> FloatArray:
+        """:class:`ChannelState` of what is excluded: RECOVERING where the clear time counts, else EXCLUDED."""
+        return np.where(self.clear_s > 0.0, float(ChannelState.RECOVERING), float(ChannelState.EXCLUDED))
 
 
 def initial_latch(*shape: int) -> Latch:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Final
 
 import numpy as np
 
@@ -23,10 +22,12 @@ from gbas_ground.broadcast import (
     refused_in_a_row,
 )
 from gbas_ground.causes import ExclusionCause
+from gbas_ground.channels import channel_epoch
 from gbas_ground.condition import Condition, conclude, integrity_of
 from gbas_ground.consistency import Corrections, Exclusions, Finding, Measured, agree, no_exclusions, standing
 from gbas_ground.corrections import BoolArray, range_correction_m
 from gbas_ground.ephemerides import EphemerisState, initial_ephemerides
+from gbas_ground.event_log import EventLog
 from gbas_ground.executive import advance, exclude, release
 from gbas_ground.geometry import Expected, Site, expected, site_of
 from gbas_ground.monitors.expected_range import check_expected_range
@@ -35,10 +36,8 @@ from gbas_ground.monitors.signal_power import check_signal_power
 from gbas_ground.params import GroundParams
 from gbas_ground.tracking import RawEpoch, TrackGroup, Tracks, initial_tracking, stack, track
 from gbas_msgs_py.events import Event, EventKind
-from gbas_msgs_py.records import ChannelState, IntegrityEpoch
+from gbas_msgs_py.records import ChannelEpoch, ChannelState, IntegrityEpoch
 from gbas_msgs_py.vdb.burst import Burst
-
-SOURCE: Final = "ground_station"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -59,6 +58,24 @@ class GroundEpoch:
     tow_s: float
     observations: tuple[ObservationEpoch | None, ...]
     ephemerides: tuple[Ephemeris, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Monitored:
+    """What the station makes of one epoch, whatever happened.
+
+    Attributes
+    ----------
+    integrity : IntegrityEpoch
+        Corrections, and what may be broadcast of them.
+    channels : ChannelEpoch
+        State and cause of every receiver's channel of every satellite.
+    events : tuple of Event
+    """
+
+    integrity: IntegrityEpoch
+    channels: ChannelEpoch
+    events: tuple[Event, ...]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -106,6 +123,8 @@ class MonitorState:
         Receivers behind the corrections of the last epoch.
     serving : bool
         Whether there were corrections at the last epoch.
+    channels : ChannelEpoch or None
+        The executive's table of the last epoch.
     """
 
     key: int | None
@@ -120,6 +139,7 @@ class MonitorState:
     present: BoolArray
     contributing: BoolArray
     serving: bool
+    channels: ChannelEpoch | None = None
 
 
 def initial_monitor_state(params: GroundParams) -> MonitorState:
@@ -167,9 +187,7 @@ class GroundStation:
     """The station's steps; it holds nothing itself. Nodes, the offline command and studies all use these."""
 
     @staticmethod
-    def monitor(
-        state: MonitorState, epoch: GroundEpoch, params: GroundParams
-    ) -> tuple[MonitorState, IntegrityEpoch, tuple[Event, ...]]:
+    def monitor(state: MonitorState, epoch: GroundEpoch, params: GroundParams) -> tuple[MonitorState, Monitored]:
         """Corrections of one epoch after monitoring.
 
         Parameters
@@ -183,9 +201,8 @@ class GroundStation:
         Returns
         -------
         state : MonitorState
-        integrity : IntegrityEpoch
-            Of the same epoch, whatever happened.
-        events : tuple of Event
+        monitored : Monitored
+            Of the same epoch.
 
         Raises
         ------
@@ -208,56 +225,29 @@ class GroundStation:
     @staticmethod
     def step(
         state: StationState, epoch: GroundEpoch, params: GroundParams
-    ) -> tuple[StationState, IntegrityEpoch, tuple[Burst, ...], tuple[Event, ...]]:
+    ) -> tuple[StationState, Monitored, tuple[Burst, ...]]:
         """Both together."""
-        monitor, integrity, events = GroundStation.monitor(state.monitor, epoch, params)
-        broadcast, bursts = GroundStation.broadcast(state.broadcast, integrity, params)
-        return StationState(monitor=monitor, broadcast=broadcast), integrity, bursts, events
+        monitor, monitored = GroundStation.monitor(state.monitor, epoch, params)
+        broadcast, bursts = GroundStation.broadcast(state.broadcast, monitored.integrity, params)
+        return StationState(monitor=monitor, broadcast=broadcast), monitored, bursts
 
 
-def _monitor(
-    state: MonitorState, epoch: GroundEpoch, params: GroundParams
-) -> tuple[MonitorState, IntegrityEpoch, tuple[Event, ...]]:
-    events = _Events(epoch)
+def _monitor(state: MonitorState, epoch: GroundEpoch, params: GroundParams) -> tuple[MonitorState, Monitored]:
+    events = EventLog(epoch.gps_week, epoch.tow_s)
     admitted = _admit(state, epoch, params, events)
     if admitted is None:
         refused = replace(state, refused=_refused(state, epoch), refused_key=epoch_key(epoch.gps_week, epoch.tow_s))
-        return refused, empty_integrity(epoch.gps_week, epoch.tow_s), events.all()
-    new, integrity = _process(admitted, epoch, params, events)
-    return new, integrity, events.all()
-
-
-class _Events:
-    """Events of one epoch, collected."""
-
-    def __init__(self, epoch: GroundEpoch) -> None:
-        self._gps_week, self._tow_s = epoch.gps_week, epoch.tow_s
-        self._list: list[Event] = []
-
-    def add(self, kind: EventKind, subject: str, cause: str, value: float = np.nan, threshold: float = np.nan) -> None:
-        self._list.append(
-            Event(
-                gps_week=self._gps_week, tow_s=self._tow_s, kind=kind, subject=subject, cause=cause,
-                value=float(value), threshold=float(threshold), source=SOURCE,
-            )
-        )  # fmt: skip
-
-    def extend(self, events: tuple[Event, ...]) -> None:
-        self._list.extend(events)
-
-    def found(self, findings: tuple[Finding, ...]) -> None:
-        for each in findings:
-            self.add(EventKind.EXCLUSION, each.subject, each.cause.word, each.value, each.threshold)
-
-    def all(self) -> tuple[Event, ...]:
-        return tuple(self._list)
+        nothing = ChannelEpoch(gps_week=epoch.gps_week, tow_s=epoch.tow_s)
+        integrity = empty_integrity(epoch.gps_week, epoch.tow_s)
+        return refused, Monitored(integrity=integrity, channels=nothing, events=events.all())
+    return _process(admitted, epoch, params, events)
 
 
 def _refused(state: MonitorState, epoch: GroundEpoch) -> int:
     return refused_in_a_row(state.refused, state.refused_key, epoch_key(epoch.gps_week, epoch.tow_s))
 
 
-def _admit(state: MonitorState, epoch: GroundEpoch, params: GroundParams, events: _Events) -> MonitorState | None:
+def _admit(state: MonitorState, epoch: GroundEpoch, params: GroundParams, events: EventLog) -> MonitorState | None:
     """The state to continue from; None refuses the epoch."""
     key = epoch_key(epoch.gps_week, epoch.tow_s)
     if state.key is None or key > state.key:
@@ -271,8 +261,8 @@ def _admit(state: MonitorState, epoch: GroundEpoch, params: GroundParams, events
 
 
 def _process(
-    state: MonitorState, epoch: GroundEpoch, params: GroundParams, events: _Events
-) -> tuple[MonitorState, IntegrityEpoch]:
+    state: MonitorState, epoch: GroundEpoch, params: GroundParams, events: EventLog
+) -> tuple[MonitorState, Monitored]:
     key = epoch_key(epoch.gps_week, epoch.tow_s)
     dt_s = float("nan") if state.key is None else (key - state.key) / 1000.0
     site, satellites = _constants(params)
@@ -306,6 +296,9 @@ def _process(
 
     condition = conclude(tracked, tracks, known, measured, made, new_exclusions, params)
     integrity = integrity_of(epoch.gps_week, epoch.tow_s, known, measured, made, condition)
+    channels = channel_epoch(
+        epoch.gps_week, epoch.tow_s, tracked, tracks, measured, made, condition, new_exclusions, state.channels
+    )
     serving = bool((condition.state == ChannelState.USABLE).any())
     contributing = (made.used & (condition.state == ChannelState.USABLE)).any(axis=1)
     _contribution_events(state, contributing, raw, new_exclusions, events)
@@ -330,12 +323,13 @@ def _process(
         present=raw.present,
         contributing=contributing,
         serving=serving,
+        channels=channels,
     )
-    return new, integrity
+    return new, Monitored(integrity=integrity, channels=channels, events=events.all())
 
 
 def _ephemerides(
-    state: MonitorState, epoch: GroundEpoch, params: GroundParams, events: _Events
+    state: MonitorState, epoch: GroundEpoch, params: GroundParams, events: EventLog
 ) -> tuple[EphemerisState, BoolArray]:
     known = state.ephemerides
     for received in epoch.ephemerides:
@@ -346,7 +340,7 @@ def _ephemerides(
     return known, changed
 
 
-def _of_this_epoch(epoch: GroundEpoch, events: _Events) -> tuple[ObservationEpoch | None, ...]:
+def _of_this_epoch(epoch: GroundEpoch, events: EventLog) -> tuple[ObservationEpoch | None, ...]:
     """The observations; one that carries another epoch does not count."""
     result: list[ObservationEpoch | None] = []
     for row, each in enumerate(epoch.observations):
@@ -359,13 +353,13 @@ def _of_this_epoch(epoch: GroundEpoch, events: _Events) -> tuple[ObservationEpoc
     return tuple(result)
 
 
-def _receiver_events(state: MonitorState, raw: RawEpoch, events: _Events) -> None:
+def _receiver_events(state: MonitorState, raw: RawEpoch, events: EventLog) -> None:
     for row in np.flatnonzero(raw.present != state.present):
         events.add(EventKind.INPUT, f"rr{row + 1}", "back" if raw.present[row] else "missing")
 
 
 def _contribution_events(
-    state: MonitorState, contributing: BoolArray, raw: RawEpoch, exclusions: Exclusions, events: _Events
+    state: MonitorState, contributing: BoolArray, raw: RawEpoch, exclusions: Exclusions, events: EventLog
 ) -> None:
     """Receivers that went out of the corrections, or came into them, without an event of their own."""
     told = ~raw.present | exclusions.receivers.excluded
@@ -375,7 +369,7 @@ def _contribution_events(
         events.add(EventKind.READMISSION, f"rr{row + 1}", "used")
 
 
-def _released(exclusions: Exclusions, params: GroundParams, events: _Events) -> Exclusions:
+def _released(exclusions: Exclusions, params: GroundParams, events: EventLog) -> Exclusions:
     """End what has been clear for the re-admission time."""
     channels, channels_ended = release(exclusions.channels, params.readmission_time_s)
     receivers, receivers_ended = release(exclusions.receivers, params.readmission_time_s)
@@ -401,7 +395,7 @@ def _channel_checks(raw: RawEpoch, should: Expected, tracked: BoolArray, params:
     return ((ExclusionCause.RANGE_RESIDUAL, residual), (ExclusionCause.SIGNAL_POWER, power))
 
 
-def _exclude_channels(exclusions: Exclusions, checks: _Checks, events: _Events) -> Exclusions:
+def _exclude_channels(exclusions: Exclusions, checks: _Checks, events: EventLog) -> Exclusions:
     channels = exclusions.channels
     for cause, check in checks:
         if not check.failed.any():
@@ -414,7 +408,7 @@ def _exclude_channels(exclusions: Exclusions, checks: _Checks, events: _Events) 
 
 
 def _exclude_receivers(
-    exclusions: Exclusions, residual: MonitorResult, params: GroundParams, events: _Events
+    exclusions: Exclusions, residual: MonitorResult, params: GroundParams, events: EventLog
 ) -> Exclusions:
     """Receivers far from the expected ranges on several satellites.
 
@@ -484,7 +478,7 @@ def _advanced(
 
 
 def _satellite_events(
-    state: MonitorState, condition: Condition, serving: bool, findings: tuple[Finding, ...], events: _Events
+    state: MonitorState, condition: Condition, serving: bool, findings: tuple[Finding, ...], events: EventLog
 ) -> None:
     """Satellites that came into use or went out of it, and the station with the first and the last of them."""
     now, was = condition.state == ChannelState.USABLE, state.satellites == ChannelState.USABLE

@@ -15,12 +15,16 @@ _RECEIVERS = range(1, MAX_REFERENCE_RECEIVERS + 1)
 
 
 class ChannelState(IntEnum):
-    """State of a satellite at the ground station; only USABLE is broadcast as valid."""
+    """State of a satellite at the ground station, or of one receiver's channel; only USABLE is broadcast as valid."""
 
     NOT_TRACKED = 0
     SETTLING = 1
+    """Its filters have not run long enough."""
     USABLE = 2
     EXCLUDED = 3
+    """A monitor fails, or what is needed for its use is not there."""
+    RECOVERING = 4
+    """Excluded by a monitor that passes again: used after the re-admission time without a failure."""
 
 
 class ServiceType(IntEnum):
@@ -56,6 +60,23 @@ class IntegrityEpoch(Record):
     )
     receiver_used: FloatArray = per_satellite(
         "-", "1 where the receiver's channel was used", columns=tuple(f"rr{j}_used" for j in _RECEIVERS)
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ChannelEpoch(Record):
+    """The ground station's executive at one epoch: state, cause and its duration of satellites and their channels.
+
+    A row for every satellite that is tracked, in view or excluded. Channels of an excluded receiver carry its cause.
+    """
+
+    state: FloatArray = per_satellite("-", "ChannelState of the satellite")
+    cause: FloatArray = per_satellite("-", "ExclusionCause of the satellite, 0 when none")
+    since_s: FloatArray = per_satellite("s", "time in this state with this cause")
+    channel_state: FloatArray = per_satellite("-", "ChannelState", columns=tuple(f"rr{j}_state" for j in _RECEIVERS))
+    channel_cause: FloatArray = per_satellite("-", "ExclusionCause", columns=tuple(f"rr{j}_cause" for j in _RECEIVERS))
+    channel_since_s: FloatArray = per_satellite(
+        "s", "time in this state with this cause", columns=tuple(f"rr{j}_since_s" for j in _RECEIVERS)
     )
 
 

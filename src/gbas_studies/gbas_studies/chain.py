@@ -16,7 +16,7 @@ from gbas_core.gpstime import epoch_key, from_epoch_key
 from gbas_core.observations import ObservationEpoch
 from gbas_core.recording import RecordedEpoch
 from gbas_ground.params import GroundParams
-from gbas_ground.station import GroundEpoch, GroundStation, StationState
+from gbas_ground.station import GroundEpoch, GroundStation, Monitored, StationState
 from gbas_ground.station import initial_state as initial_station
 from gbas_msgs_py.events import Event
 from gbas_msgs_py.joining import AirborneInput, AirborneJoiner, ReceptionQueue
@@ -31,9 +31,18 @@ Channel = Callable[[int, tuple[Burst, ...]], Iterable[Burst]]
 class GroundOutput:
     """What the station made of one epoch."""
 
-    integrity: IntegrityEpoch
+    monitored: Monitored
     bursts: tuple[Burst, ...]
-    events: tuple[Event, ...]
+
+    @property
+    def integrity(self) -> IntegrityEpoch:
+        """Corrections, and what may be broadcast of them."""
+        return self.monitored.integrity
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """What happened."""
+        return self.monitored.events
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,7 +106,7 @@ class Chain:
     def ground_step(self, epoch: RecordedEpoch) -> GroundOutput:
         """Step the station alone."""
         week, tow_s = from_epoch_key(epoch.key)
-        self._ground_state, integrity, bursts, events = GroundStation.step(
+        self._ground_state, monitored, bursts = GroundStation.step(
             self._ground_state,
             GroundEpoch(
                 gps_week=week,
@@ -107,7 +116,7 @@ class Chain:
             ),
             self._ground_params,
         )
-        return GroundOutput(integrity=integrity, bursts=bursts, events=events)
+        return GroundOutput(monitored=monitored, bursts=bursts)
 
     def airborne_step(self, joined: AirborneInput[ObservationEpoch]) -> AirborneOutput:
         """Step the aircraft alone."""

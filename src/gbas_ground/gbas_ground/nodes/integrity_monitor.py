@@ -25,6 +25,7 @@ class IntegrityMonitor(GbasNode):
         self.receivers = tuple(f"rr{j}" for j in range(1, self.station.n_receivers + 1))
         self.joiner: EpochJoiner[ObservationEpoch] = EpochJoiner(self.receivers, timeout_s=self.params.join_timeout_s)
         self.integrity = self.table_publisher(topics.GROUND_INTEGRITY, tables.INTEGRITY, readers=1)
+        self.channels = self.table_publisher(topics.GROUND_CHANNELS, tables.CHANNELS)
         self.publish_schemas()
         self.ephemerides = self.ephemeris_queue()
         for receiver, topic in zip(self.receivers, topics.GROUND_OBSERVATIONS, strict=False):
@@ -53,9 +54,10 @@ class IntegrityMonitor(GbasNode):
             observations=tuple(None if each is None or each.empty else each for each in seen),
             ephemerides=self.ephemerides.take(joined.key),
         )
-        self.state, integrity, events = GroundStation.monitor(self.state, epoch, self.station)
-        self.integrity.publish(integrity)
-        self.publish_events(events)
+        self.state, monitored = GroundStation.monitor(self.state, epoch, self.station)
+        self.integrity.publish(monitored.integrity)
+        self.channels.publish(monitored.channels)
+        self.publish_events(monitored.events)
         self.finished_epoch(week, tow_s)
 
     def details(self) -> dict[str, Any]:
