@@ -18,7 +18,7 @@ from gbas_core.observations import LARGEST_OBSERVATION, ObservationEpoch
 from gbas_core.record import FloatArray
 from gbas_core.satellites import missing
 from gbas_core.signals import L1, N_BANDS
-from gbas_core.slips import SlipParams, SlipState, initial_slips, slip_step
+from gbas_core.slips import SlipParams, SlipResult, SlipState, initial_slips, slip_step
 from gbas_core.smoothing import SmoothingParams, SmoothingState, initial_smoothing, smooth_step
 from gbas_ground.corrections import BoolArray
 from gbas_ground.params import GroundParams
@@ -74,18 +74,24 @@ class TrackGroup:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Tracks:
-    """Result of one epoch: arrays ``(tau, R, N)`` and ``(R, N)``.
+    """Result of one epoch.
 
     Attributes
     ----------
-    smoothed_m
+    smoothed_m : (tau, R, N) array
         Smoothed ranges [m].
-    age_s
+    age_s : (R, N) array
         Time the filters have run [s], NaN where there is none.
+    carrier_m : (R, N_BANDS, N) array
+        Carriers, continued over steps of the receivers' clocks [m].
+    slipped : (R, N_BANDS, N) bool array
+        Where the carrier before and this one do not belong together.
     """
 
     smoothed_m: FloatArray
     age_s: FloatArray
+    carrier_m: FloatArray
+    slipped: BoolArray
 
 
 def smoothing_params(params: GroundParams) -> SmoothingParams:
@@ -119,6 +125,7 @@ def track(
     n_receivers = len(raw.present)
     smoothed_m = missing(len(params.tau_s), n_receivers)
     age_s = missing(n_receivers)
+    carrier_m, slipped = missing(n_receivers, N_BANDS), np.zeros(raw.carrier_m.shape, dtype=bool)
     stepped, waiting = [], []
     for group in groups:
         here = tuple(row for row in group.receivers if raw.present[row])
@@ -126,15 +133,19 @@ def track(
         if away:
             waiting.append(_part(group, away))
         if here:
-            new = _step(_part(group, here), raw, key, range_m, params)
+            new, found = _step(_part(group, here), raw, key, range_m, params)
             rows = list(here)
             smoothed_m[:, rows] = new.smoothing.smoothed_m
             age_s[rows] = new.smoothing.elapsed_s
+            carrier_m[rows], slipped[rows] = found.carrier_m, found.slipped
             stepped.append(new)
-    return (*_merged(stepped), *waiting), Tracks(smoothed_m=smoothed_m, age_s=age_s)
+    tracks = Tracks(smoothed_m=smoothed_m, age_s=age_s, carrier_m=carrier_m, slipped=slipped)
+    return (*_merged(stepped), *waiting), tracks
 
 
-def _step(group: TrackGroup, raw: RawEpoch, key: int, range_m: FloatArray, params: GroundParams) -> TrackGroup:
+def _step(
+    group: TrackGroup, raw: RawEpoch, key: int, range_m: FloatArray, params: GroundParams
+) -> tuple[TrackGroup, SlipResult]:
     rows = slice(None) if len(group.receivers) == len(raw.present) else list(group.receivers)
     dt_s = float("nan") if group.key is None else (key - group.key) / 1000.0
     slips, found = slip_step(
@@ -155,7 +166,7 @@ def _step(group: TrackGroup, raw: RawEpoch, key: int, range_m: FloatArray, param
         dt_s,
         smoothing_params(params),
     )
-    return TrackGroup(receivers=group.receivers, key=key, slips=slips, smoothing=smoothing)
+    return TrackGroup(receivers=group.receivers, key=key, slips=slips, smoothing=smoothing), found
 
 
 _State = TypeVar("_State", SlipState, SmoothingState)
