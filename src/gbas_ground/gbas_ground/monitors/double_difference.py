@@ -1,0 +1,252 @@
+"""Double differences of the carrier over the station's baselines, without the whole wavelengths in them.
+
+What is left of a carrier when geometry, satellite clock and troposphere are taken off is the receiver's clock, an
+unknown number of wavelengths, noise and multipath, and whatever the satellite does that it should not: a gradient of
+the ionosphere over the site, an orbit that is not the broadcast one. Differences between receivers and satellites
+remove the clocks; taking off the nearest multiple of the wavelength removes the unknown number, and every such multiple
+of the rest with it.
+
+Geometry is taken off receiver by receiver, with the range between the surveyed antenna and the satellite at the
+transmission time of that receiver's own code, instead of the paper's product of the baseline and a difference of unit
+vectors. That is exact for any baseline and for receivers that sample at different instants.
+
+A double difference does not say which of its two satellites is the bad one. Each satellite is therefore compared with
+several others, the reference satellites, and the middle one of its statistics counts: a gradient on one reference
+shifts one statistic of every other satellite, but nearly all of its own.
+
+Axes: baselines B, bands F, satellites N.
+
+Source: Belabbas et al., A GBAS Testbed to Support New Monitoring Algorithms Development for CAT III Precision Approach,
+eq (1) and (2); Khanafseh, Yang, Pervan, ION GNSS 2010. The choice of reference satellites is ours.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gbas_core.error_models import tropo_correction_m
+from gbas_core.frames import geodetic_from_ecef, rot_enu_ecef
+from gbas_core.record import FloatArray
+from gbas_core.satellites import N_SATS
+from gbas_core.signals import SPEED_OF_LIGHT_MPS, WAVELENGTH_M
+from gbas_ground.corrections import CLOCK_GROUPS, BoolArray
+from gbas_ground.gradient_detectability import wrap_m
+from gbas_ground.monitors.carrier_noise import CarrierNoise
+
+IntArray = NDArray[np.int64]
+Pairing = Literal["star", "all"]
+
+NO_REFERENCE: Final = -1
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Baselines:
+    """Pairs of reference receivers and the vectors between them; made once, by :func:`baselines_of`.
+
+    Attributes
+    ----------
+    first, second : (B,) int arrays
+        Rows of the receivers.
+    vector_m : (B, 3) array
+        From the first to the second, east, north, up [m].
+    height_m : (R,) array
+        Of the receivers above the reference point [m].
+    """
+
+    first: IntArray
+    second: IntArray
+    vector_m: FloatArray
+    height_m: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.first)
+
+
+def baselines_of(positions_m: FloatArray, reference_m: FloatArray, pairing: Pairing = "all") -> Baselines:
+    """Baselines of a station.
+
+    Parameters
+    ----------
+    positions_m : (R, 3) array
+        Surveyed antennas, ECEF [m].
+    reference_m : (3,) array
+        Reference point, ECEF [m].
+    pairing : {"all", "star"}
+        Every pair of receivers, or the first receiver with each other one, as in the paper. A star ends with its first
+        receiver.
+
+    Returns
+    -------
+    Baselines
+        None (B = 0) for a single receiver.
+
+    Raises
+    ------
+    ValueError
+        For another pairing.
+    """
+    if pairing not in ("all", "star"):
+        raise ValueError(f"pairing is {pairing!r}: it must be all or star")
+    latitude, longitude, _ = geodetic_from_ecef(reference_m)
+    enu = (np.asarray(positions_m) - reference_m) @ rot_enu_ecef(latitude, longitude).T
+    count = len(enu)
+    pairs = [(i, j) for i in range(count) for j in range(i + 1, count) if pairing == "all" or i == 0]
+    first, second = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
+    return Baselines(first=first, second=second, vector_m=enu[second] - enu[first], height_m=enu[:, 2])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Troposphere:
+    """Dry and wet air between antennas at different heights.
+
+    Attributes
+    ----------
+    refractivity : float
+        N_r at the site [-].
+    scale_height_m : float
+        h_0 [m].
+    """
+
+    refractivity: float
+    scale_height_m: float
+
+
+def carrier_residual_m(
+    carrier_m: FloatArray,
+    range_m: FloatArray,
+    clock_s: FloatArray,
+    elevation_rad: FloatArray,
+    height_m: FloatArray,
+    troposphere: Troposphere,
+    bands: tuple[int, ...],
+) -> FloatArray:
+    """Carriers without geometry, satellite clock and the troposphere that antenna heights make different.
+
+    Parameters
+    ----------
+    carrier_m : (R, N_BANDS, N) array
+        [m].
+    range_m, clock_s : (R, N) arrays
+        Expected range [m] and satellite clock [s].
+    elevation_rad : (N,) array
+    height_m : (R,) array
+        Antennas above the reference point [m].
+    troposphere : Troposphere
+        A metre of height makes 2 mm of delay between satellites at 10 degrees and the zenith.
+    bands : tuple of int
+        Bands kept.
+
+    Returns
+    -------
+    (R, F, N) array
+        Receiver clock, ambiguity, the common part of the troposphere and minus the ionosphere [m].
+    """
+    above = tropo_correction_m(
+        troposphere.refractivity, troposphere.scale_height_m, elevation_rad, height_m[:, np.newaxis], mask_rad=0.0
+    )
+    expected = range_m - SPEED_OF_LIGHT_MPS * clock_s - above
+    return carrier_m[:, list(bands)] - expected[:, np.newaxis, :]
+
+
+def reference_satellites(may_refer: BoolArray, elevation_rad: FloatArray, count: int) -> IntArray:
+    """The highest satellites of each satellite's constellation, ``(N, count)``; -1 where there are fewer.
+
+    Parameters
+    ----------
+    may_refer : (N,) bool array
+        Satellites that are healthy and tracked.
+    elevation_rad : (N,) array
+    count : int
+        Most reference satellites of one constellation.
+    """
+    result = np.full((N_SATS, count), NO_REFERENCE)
+    for group in CLOCK_GROUPS:
+        here = np.flatnonzero(may_refer & group & np.isfinite(elevation_rad))
+        highest = here[np.argsort(-elevation_rad[here], kind="stable")[:count]]
+        result[group, : len(highest)] = highest
+    return result
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DoubleDifferences:
+    """One value a baseline, band and satellite: that against the middle one of its reference satellites.
+
+    Attributes
+    ----------
+    residual_m : (B, F, N) array
+        Within half a wavelength [m]; NaN where there is none.
+    sigma_m : (B, F, N) array
+        Its sigma [m].
+    reference : (B, F, N) int array
+        The reference satellite; -1 where there is none.
+    """
+
+    residual_m: FloatArray
+    sigma_m: FloatArray
+    reference: IntArray
+
+
+def double_differences(
+    residual_m: FloatArray,
+    baselines: Baselines,
+    references: IntArray,
+    elevation_rad: FloatArray,
+    noise: CarrierNoise,
+    bands: tuple[int, ...],
+) -> DoubleDifferences:
+    """Double differences of all satellites, each against its reference satellites.
+
+    Parameters
+    ----------
+    residual_m : (R, F, N) array
+        From :func:`carrier_residual_m`; NaN where a channel is not to be used [m].
+    baselines : Baselines
+    references : (N, P) int array
+        From :func:`reference_satellites`.
+    elevation_rad : (N,) array
+    noise : CarrierNoise
+    bands : tuple of int
+        The F bands.
+
+    Notes
+    -----
+    The middle of an even number is the smaller of the two in the middle. With P = 5, a gradient that two reference
+    satellites share is found on both, and nobody else is blamed; in general with (P - 1) / 2. Fewer references than
+    that, and it is the others that fail. A satellite with a single reference shares its verdict.
+    """
+    shape = (len(baselines), len(bands), N_SATS)
+    result = np.full(shape, np.nan), np.full(shape, np.nan), np.full(shape, NO_REFERENCE)
+    single = residual_m[baselines.second] - residual_m[baselines.first]
+    here = np.flatnonzero(np.isfinite(single).any(axis=(0, 1)))
+    if here.size:
+        factors = noise.factors(len(residual_m))
+        scale = np.hypot(factors[baselines.first], factors[baselines.second])
+        sigma = scale[:, np.newaxis, np.newaxis] * noise.sigma_m(elevation_rad, bands)
+        parts = _middle(single, sigma, references, here, WAVELENGTH_M[list(bands)])
+        for whole, part in zip(result, parts, strict=True):
+            whole[..., here] = part
+    return DoubleDifferences(residual_m=result[0], sigma_m=result[1], reference=result[2])
+
+
+def _middle(
+    single_m: FloatArray, sigma_m: FloatArray, references: IntArray, here: IntArray, wavelength_m: FloatArray
+) -> tuple[FloatArray, FloatArray, IntArray]:
+    """Residual, sigma and reference of the middle statistic of the satellites `here`."""
+    others = references[here]  # (n, P)
+    valid = (others != NO_REFERENCE) & (others != here[:, np.newaxis])
+    difference = single_m[..., here, np.newaxis] - single_m[..., others]  # (B, F, n, P)
+    wrapped = np.where(valid, wrap_m(difference, wavelength_m[:, np.newaxis, np.newaxis]), np.nan)
+    variance = sigma_m**2
+    sigma = np.sqrt(variance[..., here, np.newaxis] + variance[..., others])
+    order = np.argsort(np.abs(wrapped) / sigma, axis=-1)  # NaN last
+    number = np.isfinite(wrapped).sum(axis=-1, keepdims=True)
+    middle = np.take_along_axis(order, np.maximum(number - 1, 0) // 2, axis=-1)
+    residual = np.take_along_axis(wrapped, middle, axis=-1)[..., 0]
+    chosen = np.take_along_axis(np.broadcast_to(others, wrapped.shape), middle, axis=-1)[..., 0]
+    there = np.isfinite(residual)
+    spread = np.where(there, np.take_along_axis(sigma, middle, axis=-1)[..., 0], np.nan)
+    return residual, spread, np.where(there, chosen, NO_REFERENCE)
