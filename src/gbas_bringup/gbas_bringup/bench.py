@@ -23,7 +23,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
@@ -31,6 +30,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from gbas_bringup.bench_figures import Part, document, environment
+from gbas_bringup.cli_base import data_folder
 from gbas_bringup.errors import GbasError
 
 PARTS: Final = ("steps", "simulator", "offline", "process", "latency", "replay", "files")
@@ -84,7 +84,7 @@ def run_bench(
     about = environment()
     out.mkdir(parents=True, exist_ok=True)
     measured = []
-    for name, measure in _measures(out, quick, seconds, data or _data_folder()).items():
+    for name, measure in _measures(out, quick, seconds, data or data_folder()).items():
         if name in parts:
             progress(name)
             measured.append(measure())
@@ -109,11 +109,6 @@ def _measures(out: Path, quick: bool, seconds: float | None, data: Path | None) 
         "replay": lambda: bench_live.measure_replay(out / "replay", n_epochs=_REPLAY_EPOCHS[quick]),
         "files": lambda: bench_live.measure_files(out / "files", data),
     }
-
-
-def _data_folder() -> Path | None:
-    named = os.environ.get("GBAS_DATA")
-    return Path(named) if named else None
 
 
 def print_report(result: Mapping[str, Any]) -> None:

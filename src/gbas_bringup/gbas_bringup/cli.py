@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import itertools
 import re
-import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -16,11 +15,20 @@ from typing import Annotated, Any
 
 import typer
 
-from gbas_bringup import __version__
-from gbas_bringup.cli_base import GbasGroup, ListsCommand, position_of, print_json, remember_json, speed_of
+from gbas_bringup import __version__, cli_reproduce
+from gbas_bringup.cli_base import (
+    GbasGroup,
+    Json,
+    ListsCommand,
+    command_line,
+    new_out,
+    position_of,
+    print_json,
+    print_places,
+    speed_of,
+)
 from gbas_bringup.errors import EXIT_BAD_INPUT, EXIT_INTERNAL, ConfigError
 
-OUT = Path("out")
 _WIDE = 200
 """Columns of a table that goes into a file or a pipe."""
 
@@ -39,8 +47,8 @@ sim_app = typer.Typer(help="Simulated worlds as files.", no_args_is_help=True)
 app.add_typer(bag_app, name="bag")
 app.add_typer(sim_app, name="sim")
 app.add_typer(vdb_app, name="vdb")
+cli_reproduce.register(app)
 
-Json = Annotated[bool, typer.Option("--json", help="Print JSON only.", callback=remember_json)]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Show every line the nodes write.")]
 Speed = Annotated[str, typer.Option("--speed", help="'max', or a multiple of real time.", metavar="max|N")]
 SingleProcess = Annotated[bool, typer.Option("--single-process", help="All nodes in one process.")]
@@ -59,16 +67,6 @@ def top(
     version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Print it.")] = False,
 ) -> None:
     """A whole Ground Based Augmentation System as ROS 2 nodes. Not certified equipment; not for navigation."""
-
-
-def _command_line() -> str:
-    return shlex.join(["gbas", *sys.argv[1:]])
-
-
-def _new_out(out: Path | None, stem: str) -> Path:
-    from gbas_bringup.runs import new_directory
-
-    return out if out is not None else new_directory(OUT, stem)
 
 
 # --- running nodes
@@ -91,20 +89,20 @@ def demo(
     from gbas_bringup.resources import named_config
 
     result = body.demo(
-        _new_out(out, "demo"),
+        new_out(out, "demo"),
         config=None if config is None else named_config(config),
         speed=speed_of(speed),
         single_process=single_process,
         verbose=verbose,
         quiet=as_json,
-        command=_command_line(),
+        command=command_line(),
     )
     places = {"bag": result.bag, "table": result.csv, "picture": result.picture, "summary": result.summary_file}
     if as_json:
         print_json({**result.summary, "files": {name: str(path) for name, path in places.items()}})
         return
     _print_summary(result.summary)
-    _print_places(places)
+    print_places(places)
 
 
 @app.command()
@@ -133,13 +131,13 @@ def run(
     one_driver(run_config)
     plan = RunPlan(
         config=run_config,
-        directory=_new_out(out, path.stem),
+        directory=new_out(out, path.stem),
         speed=None if speed is None else speed_of(speed),
         single_process=single_process,
         domain=domain,
         isolated=isolated,
         remaps=tuple(_remap(each) for each in remap or ()),
-        command=_command_line(),
+        command=command_line(),
     )
     execute(plan, title=path.stem, verbose=verbose, quiet=as_json)
     if not record:
@@ -152,7 +150,7 @@ def run(
     if as_json:
         print_json(document)
     else:
-        _print_places({"bag": plan.bag_path})
+        print_places({"bag": plan.bag_path})
 
 
 def _remap(text: str) -> str:
@@ -215,14 +213,14 @@ def replay(
 
     request = body.ReplayRequest(
         bag=bag,
-        out=_new_out(out, "replay"),
+        out=new_out(out, "replay"),
         speed=speed_of(speed),
         config=config,
         single_process=single_process,
         domain=domain,
         verbose=verbose,
         quiet=as_json,
-        command=_command_line(),
+        command=command_line(),
     )
     if play_only:
         body.play(request)
@@ -237,7 +235,7 @@ def replay(
             print(topic.verdict())
             if topic.explanation():
                 print(f"  {topic.explanation()}")
-        _print_places({"bag": result.replayed})
+        print_places({"bag": result.replayed})
     if not result.identical:
         raise typer.Exit(EXIT_INTERNAL)
 
@@ -279,7 +277,7 @@ def process(
         fas=fas,
         airborne=airborne,
     )
-    folder = _new_out(out, "process")
+    folder = new_out(out, "process")
     with progress("processing", enabled=not as_json) as update:
         result = body.process(request, progress=lambda done, total: update(done, total, ""))
     summary = body.write_results(result, folder)
@@ -289,7 +287,7 @@ def process(
     for note in result.notes:
         print(f"note: {note}", file=sys.stderr)
     _print_summary(summary)
-    _print_places({"table": folder / "solution.csv", "summary": folder / "summary.json"})
+    print_places({"table": folder / "solution.csv", "summary": folder / "summary.json"})
 
 
 @app.command()
@@ -313,7 +311,7 @@ def bench(
     from gbas_bringup import bench as body
     from gbas_bringup.progress import progress
 
-    folder = _new_out(out, "bench")
+    folder = new_out(out, "bench")
     with progress("measuring", enabled=not as_json) as update:
         result = body.run_bench(
             folder,
@@ -327,7 +325,7 @@ def bench(
         print_json(result)
         return
     body.print_report(result)
-    _print_places({"report": folder / "bench.json"})
+    print_places({"report": folder / "bench.json"})
 
 
 # --- simulated worlds
@@ -358,12 +356,12 @@ def sim_export(
         places = {each.stem: each for each in files.observations} | {"navigation": files.navigation}
         places |= {} if files.truth is None else {"truth": files.truth}
     if bag:
-        folder = _new_out(out, path.stem)
-        places["bag"] = body.export_bag(path, folder, quiet=as_json, command=_command_line())
+        folder = new_out(out, path.stem)
+        places["bag"] = body.export_bag(path, folder, quiet=as_json, command=command_line())
     if as_json:
         print_json({"simulated": True, "files": {name: str(place) for name, place in places.items()}})
     else:
-        _print_places(places)
+        print_places(places)
 
 
 # --- bags
@@ -450,7 +448,7 @@ def recover(
     print(f"lost {document['lost']} messages{more}")
     for topic, count in document["lost_by_topic"].items():
         print(f"  {count} of {topic}")
-    _print_places({"bag": result.target})
+    print_places({"bag": result.target})
 
 
 # --- VDB
@@ -492,12 +490,6 @@ def encode(
 
 
 # --- for people
-
-
-def _print_places(places: dict[str, Path]) -> None:
-    width = max(len(name) for name in places)
-    for name, path in places.items():
-        print(f"{name:{width}}  {path}")
 
 
 def _print_summary(summary: dict[str, Any]) -> None:

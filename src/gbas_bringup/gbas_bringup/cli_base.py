@@ -5,16 +5,19 @@ from __future__ import annotations
 import json
 import os
 import re
+import shlex
 import sys
 import traceback
 from collections.abc import Sequence
-from typing import Any
+from pathlib import Path
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperCommand, TyperGroup
 
 from gbas_bringup.errors import EXIT_BAD_INPUT, EXIT_INTERNAL, EXIT_INTERRUPTED, GbasError
 
+OUT = Path("out")
 _JSON_KEY = "gbas.json"
 _NUMBER = re.compile(r"^-\.?\d")
 _OWN_PACKAGES = ("gbas_",)
@@ -109,6 +112,9 @@ def remember_json(ctx: typer.Context, value: bool) -> bool:
     return value
 
 
+Json = Annotated[bool, typer.Option("--json", help="Print JSON only.", callback=remember_json)]
+
+
 def wants_json(ctx: Any) -> bool:
     """Whether the command was given ``--json``."""
     return bool(ctx.find_root().meta.get(_JSON_KEY))
@@ -127,6 +133,31 @@ def _plain(value: Any) -> Any:
     if isinstance(value, float) and value - value != 0.0:
         return None
     return value if isinstance(value, str | int | float | bool | type(None)) else str(value)
+
+
+def command_line() -> str:
+    """What was typed."""
+    return shlex.join(["gbas", *sys.argv[1:]])
+
+
+def new_out(out: Path | None, stem: str) -> Path:
+    """The folder a command writes to: the one given, or a new one below ``out``."""
+    from gbas_bringup.runs import new_directory
+
+    return out if out is not None else new_directory(OUT, stem)
+
+
+def data_folder() -> Path | None:
+    """Folder of recorded data named by ``GBAS_DATA``."""
+    named = os.environ.get("GBAS_DATA")
+    return Path(named) if named else None
+
+
+def print_places(places: dict[str, Path]) -> None:
+    """Say where files were written."""
+    width = max(len(name) for name in places)
+    for name, path in places.items():
+        print(f"{name:{width}}  {path}")
 
 
 def speed_of(text: str) -> float:
