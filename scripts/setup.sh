@@ -5,6 +5,8 @@ set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 venv=${1:-.venv}
 unset PYTHONPATH PYTHONHOME VIRTUAL_ENV  # a sourced ROS environment would shadow the pinned packages
+# An activated environment must not be made anew with the interpreter that goes with it.
+PATH=$(tr ':' '\n' <<<"$PATH" | grep -vxF -e "$(realpath -m "$venv")/bin" -e "$(realpath -ms "$venv")/bin" | paste -sd:)
 
 say() { printf 'setup: %s\n' "$*"; }
 die() { printf 'setup: %s\n' "$*" >&2; exit 1; }

@@ -12,6 +12,27 @@ from gbas_core.record import FloatArray, Record, per_satellite, scalar
 
 MAX_REFERENCE_RECEIVERS = 4
 _RECEIVERS = range(1, MAX_REFERENCE_RECEIVERS + 1)
+BASELINES = tuple((i, j) for i in _RECEIVERS for j in _RECEIVERS if i < j)
+"""Pairs of reference receivers, in the order in which tables have them."""
+GROUND_MONITORS = (
+    "range",
+    "power",
+    "expected_power",
+    "ccd",
+    "ccd_f",
+    "ccd_f_paper",
+    "gradient",
+    "acceleration",
+    "carrier_rate",
+    "carrier_step",
+    "ephemeris",
+    "b_value",
+    "prc",
+    "rrc",
+    "sigma_mean",
+    "sigma_spread",
+)
+"""Monitors of the ground station, in the order in which tables have them."""
 
 
 class ChannelState(IntEnum):
@@ -25,6 +46,17 @@ class ChannelState(IntEnum):
     """A monitor fails, or what is needed for its use is not there."""
     RECOVERING = 4
     """Excluded by a monitor that passes again: used after the re-admission time without a failure."""
+
+
+class MonitorState(IntEnum):
+    """What a ground monitor says of a satellite at one epoch."""
+
+    NOT_DUE = 0
+    """It does not apply: the satellite is not tracked, or the monitor needs what the station does not have."""
+    NOT_MONITORED = 1
+    """It applies, and could not look, or not yet: the satellite may not be used where the monitor is required."""
+    PASSED = 2
+    FAILED = 3
 
 
 class ServiceType(IntEnum):
@@ -77,6 +109,41 @@ class ChannelEpoch(Record):
     channel_cause: FloatArray = per_satellite("-", "ExclusionCause", columns=tuple(f"rr{j}_cause" for j in _RECEIVERS))
     channel_since_s: FloatArray = per_satellite(
         "s", "time in this state with this cause", columns=tuple(f"rr{j}_since_s" for j in _RECEIVERS)
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MonitorEpoch(Record):
+    """What every ground monitor measured at one epoch: statistic, threshold and state by satellite, and what is behind.
+
+    Where a monitor tests several values of a satellite (receivers, baselines, smoothing constants), its statistic is
+    the one that is worst against its threshold. Statistics and thresholds have the unit of the monitor's documentation.
+    """
+
+    statistic: FloatArray = per_satellite("*", "statistic", columns=GROUND_MONITORS)
+    threshold: FloatArray = per_satellite(
+        "*", "threshold of the statistic", columns=tuple(f"{name}_threshold" for name in GROUND_MONITORS)
+    )
+    state: FloatArray = per_satellite(
+        "-", "MonitorState", columns=tuple(f"{name}_state" for name in GROUND_MONITORS)
+    )
+    ccd_receiver_mps: FloatArray = per_satellite(
+        "m/s", "divergence rate of one receiver, L1", columns=tuple(f"rr{j}_ccd_mps" for j in _RECEIVERS)
+    )
+    divergence_mps: FloatArray = per_satellite(
+        "m/s",
+        "filtered rate of a two-band combination, averaged over the receivers",
+        columns=("df_mps", "df_other_mps", "if_code_mps", "if_carrier_mps"),
+    )
+    ccd_f_mode: FloatArray = per_satellite("-", "likeliest of the 15 divergence modes, 1 to 15; 0 when none is likelier")
+    ccd_f_mode_probability: FloatArray = per_satellite("-", "of that mode")
+    gradient: FloatArray = per_satellite("m/m", "smallest gradient along the runway that explains the carriers")
+    gradient_coverage: FloatArray = per_satellite("-", "share of the gradients to be detected that are detectable")
+    double_difference_m: FloatArray = per_satellite(
+        "m", "double-difference carrier of a baseline on L1", columns=tuple(f"dd{i}{j}_m" for i, j in BASELINES)
+    )
+    double_difference_l5_m: FloatArray = per_satellite(
+        "m", "double-difference carrier of a baseline on L5", columns=tuple(f"dd{i}{j}_l5_m" for i, j in BASELINES)
     )
 
 
