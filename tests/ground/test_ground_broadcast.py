@@ -36,7 +36,13 @@ def noisy(receivers=4, **changes):
     rng = np.random.default_rng(8)
     bias = rng.normal(0.0, 0.2, (receivers, 68))
     station = params(receivers, **changes)
-    return station, run(truth(receivers), station, half_seconds(30), code_error_m=lambda s: bias + 0.01 * s)
+    return station, run(
+        truth(receivers),
+        station,
+        half_seconds(30),
+        code_error_m=lambda s: bias + 0.01 * s,
+        carrier_error_m=lambda s: 0.01 * s,
+    )
 
 
 @pytest.fixture(scope="module")

@@ -72,7 +72,7 @@ def test_b_values_of_a_bias():
     where = SAT_INDEX["G01"]
     error = np.zeros((4, N_SATS))
     error[2, where] = bias
-    out = run(truth(4), params(4), half_seconds(20), code_error_m=lambda _: error)
+    out = run(truth(4), params(4), half_seconds(20), code_error_m=lambda _: error, carrier_error_m=lambda _: 0.0)
     last = out.integrity[-1]
     n = (usable(last) & IS_GPS).sum()
     # PR_sc = -error: B has the opposite sign of a range error

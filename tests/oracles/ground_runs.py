@@ -12,6 +12,7 @@ from gbas_core.ephemeris import Ephemeris
 from gbas_core.gpstime import add_seconds
 from gbas_core.observations import ObservationEpoch
 from gbas_core.record import FloatArray
+from gbas_ground.monitor_params import CcdSection, MonitorParams
 from gbas_ground.params import GroundParams
 from gbas_ground.station import GroundEpoch, GroundStation, StationState, initial_state
 from gbas_msgs_py.events import Event
@@ -39,7 +40,14 @@ def params(receivers: int = 4, **changes: Any) -> GroundParams:
         "settle_time_s": 5.0,
         "readmission_time_s": 10.0,
     }
-    return GroundParams(**(chosen | changes))
+    chosen |= changes
+    chosen.setdefault("monitors", quick_monitors(chosen["settle_time_s"]))
+    return GroundParams(**chosen)
+
+
+def quick_monitors(settle_s: float) -> MonitorParams:
+    """Monitors that count as soon as the smoothing filters do."""
+    return MonitorParams(ccd=CcdSection(settle_s=settle_s))
 
 
 @dataclass

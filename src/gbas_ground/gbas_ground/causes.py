@@ -43,6 +43,27 @@ class ExclusionCause(IntEnum):
     SIGNAL_POWER = 37
     """C/N0 below the minimum, or not given."""
 
+    CODE_CARRIER_DIVERGENCE = 38
+    """Code and carrier drift apart on one band (GAST-D monitor)."""
+    TWO_FREQUENCY_DIVERGENCE = 39
+    """Codes and carriers of two bands drift apart in a way the ionosphere does not (GAST-F monitor)."""
+    IONOSPHERE_GRADIENT = 40
+    """The ionosphere differs over the station's baselines."""
+    CARRIER_ACCELERATION = 41
+    """The carrier accelerates as no orbit and no clock in order does."""
+    CARRIER_RATE = 42
+    """The carrier's rate is not the expected one."""
+    CARRIER_STEP = 43
+    """The carrier stepped."""
+    EXPECTED_POWER = 44
+    """C/N0 below what is expected at the satellite's elevation."""
+    EPHEMERIS_RESIDUAL = 45
+    """Carriers over the baselines do not fit the broadcast orbit."""
+    SIGMA_MEAN = 46
+    """The mean of a receiver's B values over time does not fit the broadcast sigma."""
+    SIGMA_SPREAD = 47
+    """The spread of B values over time does not fit the broadcast sigma."""
+
     @property
     def word(self) -> str:
         """The cause as it stands in an event."""

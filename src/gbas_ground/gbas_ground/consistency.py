@@ -17,6 +17,7 @@ from gbas_ground import corrections as form
 from gbas_ground.causes import ExclusionCause
 from gbas_ground.corrections import CLOCK_GROUPS, BoolArray
 from gbas_ground.executive import Latch, exclude, initial_latch
+from gbas_ground.looks import Look, look
 from gbas_ground.monitors.correction_limits import check_correction
 from gbas_ground.monitors.multiple_reference import channel_sigma_m, check_b_values, check_unused
 from gbas_ground.monitors.result import MonitorResult
@@ -167,6 +168,13 @@ def limit_checks(made: Corrections, params: GroundParams) -> tuple[tuple[Exclusi
     )
 
 
+def consistency_looks(made: Corrections, params: GroundParams) -> dict[str, Look]:
+    """What the monitors of the corrections say of each satellite."""
+    has = made.count > 0
+    limits = {cause.word.removesuffix("_limit"): look(result, has) for cause, result in limit_checks(made, params)}
+    return {"b_value": look(b_value_check(made, params), made.used & (made.count >= 2)), **limits}
+
+
 def agree(
     measured: Measured, exclusions: Exclusions, params: GroundParams
 ) -> tuple[Corrections, Exclusions, tuple[Finding, ...]]:
@@ -262,7 +270,12 @@ class Standing:
 
 
 def standing(
-    measured: Measured, made: Corrections, exclusions: Exclusions, channel_ok: BoolArray, params: GroundParams
+    measured: Measured,
+    made: Corrections,
+    exclusions: Exclusions,
+    channel_ok: BoolArray,
+    satellite_ok: BoolArray,
+    params: GroundParams,
 ) -> Standing:
     """Judge what is not used against the corrections it has no part in.
 
@@ -272,6 +285,8 @@ def standing(
         As they are after :func:`agree`.
     channel_ok : (R, N) bool array
         Channels that are tracked and pass the monitors of single channels.
+    satellite_ok : (N,) bool array
+        Satellites that the monitors of signals were seen to pass.
     params : GroundParams
 
     Notes
@@ -295,13 +310,13 @@ def standing(
     within = ~np.asarray(np.any([result.failed.any(axis=0) for _, result in limit_checks(made, params)], axis=0))
     consistent = ~b_value_check(made, params).failed.any(axis=(0, 1))
     by_b = exclusions.satellites.cause == ExclusionCause.B_VALUE
-    satellites = seen & within & consistent & (~by_b | (made.count >= 2))
+    satellites = satellite_ok & seen & within & consistent & (~by_b | (made.count >= 2))
 
     together = _together(measured, made, channel_ok, params)
     return Standing(
         channels=channels | (channel_ok & together.channels),
         receivers=receivers | (together.receivers & ~disagrees.any(axis=1)),
-        satellites=satellites | together.satellites,
+        satellites=satellites | (satellite_ok & together.satellites),
     )
 
 

@@ -27,7 +27,8 @@ from gbas_core.frames import ecef_from_geodetic
 from gbas_core.record import FloatArray
 from gbas_core.satellites import SYSTEM_MASKS
 from gbas_ground.approaches import fas_data_set
-from gbas_ground.declared import REQUIRED, Declared, all_specs, arguments_from, flatten, listed, parameter
+from gbas_ground.declared import REQUIRED, Declared, all_specs, arguments_from, flatten, listed, nested, parameter
+from gbas_ground.monitor_params import MonitorParams
 from gbas_msgs_py.parameters import ParameterError, unknown_parameters
 from gbas_msgs_py.records import MAX_REFERENCE_RECEIVERS
 from gbas_msgs_py.vdb.block import encode_body
@@ -231,6 +232,8 @@ class GroundParams(Declared):
         "mean that removes a receiver's clock",
         choices=("plain", "elevation"),
     )
+
+    monitors: MonitorParams = nested(MonitorParams())
 
     approaches: tuple[FinalApproach, ...] = ()
 

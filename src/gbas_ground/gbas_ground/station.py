@@ -24,19 +24,30 @@ from gbas_ground.broadcast import (
 from gbas_ground.causes import ExclusionCause
 from gbas_ground.channels import channel_epoch
 from gbas_ground.condition import Condition, conclude, integrity_of
-from gbas_ground.consistency import Corrections, Exclusions, Finding, Measured, agree, no_exclusions, standing
+from gbas_ground.consistency import (
+    Corrections,
+    Exclusions,
+    Finding,
+    Measured,
+    agree,
+    consistency_looks,
+    no_exclusions,
+    standing,
+)
 from gbas_ground.corrections import BoolArray, range_correction_m
 from gbas_ground.ephemerides import EphemerisState, initial_ephemerides
 from gbas_ground.event_log import EventLog
 from gbas_ground.executive import advance, exclude, release
 from gbas_ground.geometry import Expected, Site, expected, site_of
+from gbas_ground.looks import look, monitor_epoch
 from gbas_ground.monitors.expected_range import check_expected_range
 from gbas_ground.monitors.result import MonitorResult
 from gbas_ground.monitors.signal_power import check_signal_power
 from gbas_ground.params import GroundParams
+from gbas_ground.surveillance import Seen, Watched, WatchState, initial_watch, watch
 from gbas_ground.tracking import RawEpoch, TrackGroup, Tracks, initial_tracking, stack, track
 from gbas_msgs_py.events import Event, EventKind
-from gbas_msgs_py.records import ChannelEpoch, ChannelState, IntegrityEpoch
+from gbas_msgs_py.records import ChannelEpoch, ChannelState, IntegrityEpoch, MonitorEpoch
 from gbas_msgs_py.vdb.burst import Burst
 
 
@@ -68,12 +79,15 @@ class Monitored:
     ----------
     integrity : IntegrityEpoch
         Corrections, and what may be broadcast of them.
+    statistics : MonitorEpoch
+        What every monitor measured.
     channels : ChannelEpoch
         State and cause of every receiver's channel of every satellite.
     events : tuple of Event
     """
 
     integrity: IntegrityEpoch
+    statistics: MonitorEpoch
     channels: ChannelEpoch
     events: tuple[Event, ...]
 
@@ -125,6 +139,8 @@ class MonitorState:
         Whether there were corrections at the last epoch.
     channels : ChannelEpoch or None
         The executive's table of the last epoch.
+    watching : WatchState
+        Monitors of signals.
     """
 
     key: int | None
@@ -139,7 +155,8 @@ class MonitorState:
     present: BoolArray
     contributing: BoolArray
     serving: bool
-    channels: ChannelEpoch | None = None
+    channels: ChannelEpoch | None
+    watching: WatchState
 
 
 def initial_monitor_state(params: GroundParams) -> MonitorState:
@@ -157,6 +174,8 @@ def initial_monitor_state(params: GroundParams) -> MonitorState:
         present=np.ones(params.n_receivers, dtype=bool),
         contributing=np.zeros(params.n_receivers, dtype=bool),
         serving=False,
+        channels=None,
+        watching=initial_watch(params),
     )
 
 
@@ -239,7 +258,10 @@ def _monitor(state: MonitorState, epoch: GroundEpoch, params: GroundParams) -> t
         refused = replace(state, refused=_refused(state, epoch), refused_key=epoch_key(epoch.gps_week, epoch.tow_s))
         nothing = ChannelEpoch(gps_week=epoch.gps_week, tow_s=epoch.tow_s)
         integrity = empty_integrity(epoch.gps_week, epoch.tow_s)
-        return refused, Monitored(integrity=integrity, channels=nothing, events=events.all())
+        statistics = MonitorEpoch(gps_week=epoch.gps_week, tow_s=epoch.tow_s)
+        return refused, Monitored(
+            integrity=integrity, statistics=statistics, channels=nothing, events=events.all()
+        )
     return _process(admitted, epoch, params, events)
 
 
@@ -280,19 +302,26 @@ def _process(
     tracking, tracks = track(state.tracking, clean, key, _comparable_range_m(should, changed), params)
 
     correction = range_correction_m(should.range_m, tracks.smoothed_m, should.clock_s)
+    settled = _settled(tracks, correction, should, params)
+    channel_ok = tracked & ~np.logical_or.reduce([check.failed for _, check in checks])
+    seen = _seen(clean, tracks, should, channel_ok, settled, known, new_exclusions, dt_s, params)
+    watching, watched = watch(state.watching, seen, params)
+    new_exclusions, noticed = _exclude_satellites(new_exclusions, watched)
     measured = Measured(
         correction_m=correction,
         previous_m=_previous_corrections(
             state.before if dt_s <= params.max_gap_s else None, known.current, changed, correction.shape, site
         ),
         dt_s=dt_s,
-        settled=_settled(tracks, correction, should, params),
+        settled=settled & watched.ready,
         elevation_rad=should.elevation_rad,
     )
     made, new_exclusions, findings = agree(measured, new_exclusions, params)
+    findings = (*noticed, *findings)
     events.found(findings)
-    channel_ok = tracked & ~np.logical_or.reduce([check.failed for _, check in checks])
-    new_exclusions = _advanced(new_exclusions, measured, made, channel_ok, dt_s, params)
+    new_exclusions = _advanced(
+        new_exclusions, measured, made, channel_ok, watched.passed & watched.ready, dt_s, params
+    )
 
     condition = conclude(tracked, tracks, known, measured, made, new_exclusions, params)
     integrity = integrity_of(epoch.gps_week, epoch.tow_s, known, measured, made, condition)
@@ -324,8 +353,12 @@ def _process(
         contributing=contributing,
         serving=serving,
         channels=channels,
+        watching=watching,
     )
-    return new, Monitored(integrity=integrity, channels=channels, events=events.all())
+    looks = {name: look(result, tracked) for name, (_, result) in zip(("range", "power"), checks, strict=True)}
+    looks |= {**watched.looks, **consistency_looks(made, params)}
+    statistics = monitor_epoch(epoch.gps_week, epoch.tow_s, looks, watched.details, np.isfinite(integrity.state))
+    return new, Monitored(integrity=integrity, statistics=statistics, channels=channels, events=events.all())
 
 
 def _ephemerides(
@@ -425,6 +458,46 @@ def _exclude_receivers(
     return replace(exclusions, receivers=exclude(exclusions.receivers, failed, ExclusionCause.RECEIVER_FAULT))
 
 
+def _seen(
+    raw: RawEpoch,
+    tracks: Tracks,
+    should: Expected,
+    channel_ok: BoolArray,
+    settled: BoolArray,
+    known: EphemerisState,
+    exclusions: Exclusions,
+    dt_s: float,
+    params: GroundParams,
+) -> Seen:
+    """What the monitors of signals are given."""
+    ready = channel_ok & exclusions.usable_channels() & settled
+    due = (ready.sum(axis=0) >= params.min_receivers) & np.isfinite(known.crc)
+    return Seen(
+        code_m=raw.code_m,
+        carrier_m=tracks.carrier_m,
+        cn0_dbhz=raw.cn0_dbhz,
+        slipped=tracks.slipped,
+        ready=ready,
+        due=due,
+        may_refer=due & ~exclusions.satellites.excluded,
+        expected=should,
+        dt_s=dt_s,
+    )
+
+
+def _exclude_satellites(exclusions: Exclusions, watched: Watched) -> tuple[Exclusions, tuple[Finding, ...]]:
+    """Exclude the satellites that monitors of signals fail; several may fail one, and each says so."""
+    satellites, findings = exclusions.satellites, []
+    for cause, result, excludes in watched.verdicts:
+        if not excludes or not result.failed.any():
+            continue
+        for satellite in np.flatnonzero(result.failed & ~exclusions.satellites.excluded):
+            value, threshold = result.at(int(satellite))
+            findings.append(Finding(subject=SAT_IDS[satellite], cause=cause, value=value, threshold=threshold))
+        satellites = exclude(satellites, result.failed, cause)
+    return replace(exclusions, satellites=satellites), tuple(findings)
+
+
 def _without(raw: RawEpoch, failed: BoolArray) -> RawEpoch:
     """Raw observations without those that must not enter a filter."""
     if not failed.any():
@@ -462,6 +535,7 @@ def _advanced(
     measured: Measured,
     made: Corrections,
     channel_ok: BoolArray,
+    satellite_ok: BoolArray,
     dt_s: float,
     params: GroundParams,
 ) -> Exclusions:
@@ -469,7 +543,7 @@ def _advanced(
     latches = (exclusions.channels, exclusions.receivers, exclusions.satellites)
     if not any(latch.excluded.any() for latch in latches):
         return exclusions
-    passed = standing(measured, made, exclusions, channel_ok, params)
+    passed = standing(measured, made, exclusions, channel_ok, satellite_ok, params)
     return Exclusions(
         channels=advance(exclusions.channels, passed.channels, dt_s, params.max_gap_s),
         receivers=advance(exclusions.receivers, passed.receivers, dt_s, params.max_gap_s),

@@ -120,7 +120,9 @@ class MonitorEpoch(Record):
     the one that is worst against its threshold. Statistics and thresholds have the unit of the monitor's documentation.
     """
 
-    statistic: FloatArray = per_satellite("*", "statistic", columns=GROUND_MONITORS)
+    statistic: FloatArray = per_satellite(
+        "*", "statistic", columns=tuple(f"{name}_statistic" for name in GROUND_MONITORS)
+    )
     threshold: FloatArray = per_satellite(
         "*", "threshold of the statistic", columns=tuple(f"{name}_threshold" for name in GROUND_MONITORS)
     )
@@ -135,7 +137,7 @@ class MonitorEpoch(Record):
         "filtered rate of a two-band combination, averaged over the receivers",
         columns=("df_mps", "df_other_mps", "if_code_mps", "if_carrier_mps"),
     )
-    ccd_f_mode: FloatArray = per_satellite("-", "likeliest of the 15 divergence modes, 1 to 15; 0 when none is likelier")
+    ccd_f_mode: FloatArray = per_satellite("-", "likeliest of the 15 divergence modes, 1 to 15; 0 is no fault")
     ccd_f_mode_probability: FloatArray = per_satellite("-", "of that mode")
     gradient: FloatArray = per_satellite("m/m", "smallest gradient along the runway that explains the carriers")
     gradient_coverage: FloatArray = per_satellite("-", "share of the gradients to be detected that are detectable")

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gbas_core.ephemeris import Ephemeris
 from gbas_core.observations import ObservationEpoch
 from gbas_core.record import Record, scalar
-from gbas_msgs_py.records import ChannelEpoch, IntegrityEpoch, ProtectionEpoch, SolutionEpoch
+from gbas_msgs_py.records import ChannelEpoch, IntegrityEpoch, MonitorEpoch, ProtectionEpoch, SolutionEpoch
 from gbas_msgs_py.schema import LABEL_PREFIX, SchemaError, TableSchema
 
 
@@ -36,6 +36,7 @@ class TruthEpoch(Record):
 OBSERVATIONS: Final = TableSchema("observations", 1, ObservationEpoch)
 EPHEMERIS: Final = TableSchema("ephemeris", 1, Ephemeris)
 INTEGRITY: Final = TableSchema("integrity", 1, IntegrityEpoch)
+MONITORS: Final = TableSchema("monitors", 1, MonitorEpoch)
 CHANNELS: Final = TableSchema("channels", 1, ChannelEpoch)
 SOLUTION: Final = TableSchema("solution", 1, SolutionEpoch)
 PROTECTION: Final = TableSchema("protection", 1, ProtectionEpoch)
@@ -44,7 +45,7 @@ TRUTH: Final = TableSchema("truth", 1, TruthEpoch)
 
 SCHEMAS: Final[dict[str, TableSchema[Any]]] = {
     schema.name: schema
-    for schema in (OBSERVATIONS, EPHEMERIS, INTEGRITY, CHANNELS, SOLUTION, PROTECTION, PROGRESS, TRUTH)
+    for schema in (OBSERVATIONS, EPHEMERIS, INTEGRITY, MONITORS, CHANNELS, SOLUTION, PROTECTION, PROGRESS, TRUTH)
 }
 
 

@@ -25,6 +25,7 @@ GROUND_OBSERVATIONS: Final[tuple[str, ...]] = tuple(
     f"ground/rr{j}/observations" for j in range(1, MAX_REFERENCE_RECEIVERS + 1)
 )
 GROUND_INTEGRITY: Final = "ground/integrity"
+GROUND_MONITORS: Final = "ground/monitors"
 GROUND_CHANNELS: Final = "ground/channels"
 AIRBORNE_OBSERVATIONS: Final = "airborne/observations"
 AIRBORNE_EPHEMERIS: Final = "airborne/ephemeris"
@@ -91,6 +92,7 @@ TOPICS: Final[tuple[TopicSpec, ...]] = (
     TopicSpec(name=EPHEMERIS, message_type=_TABLE, schema="gbas/ephemeris/1", latched=True),
     TopicSpec(name=AIRBORNE_EPHEMERIS, message_type=_TABLE, schema="gbas/ephemeris/1", latched=True),
     TopicSpec(name=GROUND_INTEGRITY, message_type=_TABLE, schema="gbas/integrity/1"),
+    TopicSpec(name=GROUND_MONITORS, message_type=_TABLE, schema="gbas/monitors/1"),
     TopicSpec(name=GROUND_CHANNELS, message_type=_TABLE, schema="gbas/channels/1"),
     TopicSpec(name=VDB, message_type="std_msgs/msg/UInt8MultiArray", schema="gbas/vdb_burst/1"),
     TopicSpec(name=AIRBORNE_SOLUTION, message_type=_TABLE, schema="gbas/solution/1"),
