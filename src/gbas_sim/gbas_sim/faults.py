@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
+from gbas_core.fault_modes import FAULT_MODES
 from gbas_core.record import FloatArray
 from gbas_sim.fault_base import RECEIVERS, Growing, Listener, Moment, SatelliteFault, SignalEffect, Window
 from gbas_sim.orbit_faults import BROADCAST_FIELDS, BroadcastFault, OrbitFault, displaced, with_wrong_broadcasts
@@ -25,7 +26,6 @@ from gbas_sim.receiver_faults import (
     source_epochs,
 )
 from gbas_sim.signal_faults import (
-    FAULT_MODES,
     ClockFault,
     CodeCarrierDivergence,
     CycleSlip,

@@ -1,7 +1,6 @@
 """Faults of satellites' signals: divergence, acceleration, clocks, power, deformation, slips, losses of lock.
 
-Source of the divergence's fifteen modes and their signs: Jiang, Milner, Macabiau, "Code-carrier divergence monitoring
-for GAST-F GBAS", ENC 2015, 2.2 and figures 5 and 7: the code diverges by +d, the carrier by -d.
+The divergence's fifteen modes and their signs are those of :mod:`gbas_core.fault_modes`.
 """
 
 from __future__ import annotations
@@ -11,31 +10,13 @@ from typing import ClassVar, Final
 
 import numpy as np
 
+from gbas_core.fault_modes import FAULT_MODES, FAULT_SIGNS
 from gbas_core.record import FloatArray
 from gbas_core.satellites import IS_GPS
 from gbas_core.signals import BAND_INDEX, L1, L5, SPEED_OF_LIGHT_MPS, WAVELENGTH_M
 from gbas_sim.bounds import all_within, one_of
 from gbas_sim.deformation import Correlator, Deformation, deformation_bias_m
 from gbas_sim.fault_base import RECEIVERS, Growing, Listener, Moment, SatelliteFault, SignalEffect
-
-FAULT_MODES: Final[dict[str, tuple[bool, bool, bool, bool]]] = {
-    "Code L1": (True, False, False, False),
-    "Code L5": (False, True, False, False),
-    "Carrier L1": (False, False, True, False),
-    "Carrier L5": (False, False, False, True),
-    "Code L1+L5": (True, True, False, False),
-    "Carrier L1+L5": (False, False, True, True),
-    "Code+Carrier L1": (True, False, True, False),
-    "Code+Carrier L5": (False, True, False, True),
-    "Code L1, Carrier L5": (True, False, False, True),
-    "Code L5, Carrier L1": (False, True, True, False),
-    "Code L1+L5, Carrier L1": (True, True, True, False),
-    "Code L1+L5, Carrier L5": (True, True, False, True),
-    "Code L1, Carrier L1+L5": (True, False, True, True),
-    "Code L5, Carrier L1+L5": (False, True, True, True),
-    "Code+Carrier L1+L5": (True, True, True, True),
-}
-"""Where a divergence acts, (code L1, code L5, carrier L1, carrier L5), by the paper's names in the paper's order."""
 
 _SIGNALS_OF_BANDS: Final = {"L1": (0, 1), "L5": (2, 2)}
 
@@ -47,7 +28,7 @@ class CodeCarrierDivergence(Growing, SatelliteFault):
     Attributes
     ----------
     mode : str
-        One of the fifteen names of :data:`FAULT_MODES`.
+        One of the fifteen names of :data:`gbas_core.fault_modes.FAULT_MODES`.
     weights : (float, float, float, float)
         Factors on d for (code L1, code L5, carrier L1, carrier L5), as far as the mode has them; the paper assumes
         that they may differ. (1, 1.7933, -1, -1.7933) on all four is how an ionosphere looks.
@@ -56,7 +37,7 @@ class CodeCarrierDivergence(Growing, SatelliteFault):
     kind: ClassVar[str] = "divergence"
 
     mode: str
-    weights: tuple[float, float, float, float] = (1.0, 1.0, -1.0, -1.0)
+    weights: tuple[float, float, float, float] = FAULT_SIGNS
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -11,5 +11,9 @@ business but the executive's (:mod:`gbas_ground.executive`).
 :mod:`~.multiple_reference`          B values (MRCC)
 :mod:`~.correction_limits`           size of PRC and RRC
 :mod:`~.ephemeris_change`            a new ephemeris against the one before
+:mod:`~.code_carrier_divergence`     code-carrier divergence of single bands (GAST D)
+:mod:`~.two_frequency_divergence`    the same on two bands, without ionosphere (proposed for GAST F)
+:mod:`~.divergence_covariance`       covariance of its statistics, calibrated from data
+:mod:`~.divergence_classification`   which of the fifteen fault modes it looks like
 ===================================  ==========================================================
 """

@@ -1,0 +1,342 @@
+"""Divergence on two frequencies: the CCD monitor proposed for GAST F, which does not see the ionosphere.
+
+From code and carrier of two bands each receiver forms the divergence-free code minus carrier of both bands (DF) and
+the ionosphere-free carrier (IF), from which geometry, satellite clock, troposphere and its own clock are removed. The
+rates are filtered as for GAST D and averaged over receivers, and a quadratic form of the means is compared with a
+quantile of chi-square. Two forms run side by side:
+
+- *paper*: four statistics, with ionosphere-free code minus carrier, the printed covariance and its pseudo-inverse,
+  4 degrees of freedom, threshold 47.8795. The fourth is a combination of the first two and the printed covariance has a
+  negative eigenvalue (-6.2e-11 (m/s)^2): the form is kept so that the paper can be reproduced.
+- *sound*: DF, DF, IF carrier with a covariance of their own (:mod:`~.divergence_covariance`), 3 degrees of freedom,
+  threshold 44.84.
+
+A divergence like the ionosphere's, (1, gamma, -1, -gamma) on codes and carriers, is invisible to both, on purpose.
+
+The receiver clock of a satellite is the mean over the *other* satellites of its constellation. A channel that misses
+epochs bridges the gap with the clock accumulated meanwhile. A fault as large as d appears on the n others as -d/n until
+the satellite is taken out of the mean, so the caller names the satellites that may be in it.
+
+Source: Jiang, Milner, Macabiau, ENC 2015, eq (8) to (18).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Final, Literal
+
+import numpy as np
+from scipy.special import chdtri
+
+from gbas_core.combinations import divergence_free_cmc, iono_free_weights, ionosphere_free
+from gbas_core.divergence import (
+    GROUND,
+    DivergenceParams,
+    DivergenceState,
+    divergence_step,
+    initial_divergence,
+    rate_step,
+    settled,
+)
+from gbas_core.record import FloatArray
+from gbas_core.satellites import N_SATS
+from gbas_core.signals import BANDS, L1, L5, N_BANDS, SPEED_OF_LIGHT_MPS
+from gbas_ground.corrections import CLOCK_GROUPS, BoolArray
+from gbas_ground.monitors.code_carrier_divergence import receiver_mean
+from gbas_ground.monitors.divergence_covariance import PRINTED_COVARIANCE, StatisticCovariance
+from gbas_ground.monitors.result import MonitorResult, upper_limit
+
+Form = Literal["paper", "sound"]
+DEGREES_OF_FREEDOM: Final[dict[Form, int]] = {"paper": 4, "sound": 3}
+# Known: obliquity 1 / sqrt(0.002 + sin^2 E). Source: ICAO Annex 10 Vol. I, App. B 3.6.5.3.
+_OBLIQUITY: Final = 0.002
+_PRINTED_INVERSE: Final = np.linalg.pinv(PRINTED_COVARIANCE)
+
+
+def threshold(form: Form, p_false_alarm: float) -> float:
+    """Quantile of chi-square: 47.8795 for the paper's four statistics at 1e-9, 44.84 for the three [-]."""
+    return float(chdtri(float(DEGREES_OF_FREEDOM[form]), p_false_alarm))
+
+
+@dataclass(frozen=True, kw_only=True)
+class TwoFrequencyParams:
+    """What the monitor is set to.
+
+    Attributes
+    ----------
+    band, other : int
+        The two bands: L1 and L5 (with it E1 and E5a), or L1 and L2.
+    filters : DivergenceParams
+    p_false_alarm : float
+        An epoch and satellite [-].
+    min_clock_satellites : int
+        Fewest other satellites a receiver clock is averaged from.
+    zenith_delay_m : float
+        Troposphere at the station, removed from the carrier; at 5 degrees its rate reaches 0.03 m/s [m].
+    covariance : StatisticCovariance
+        Of the sound form.
+    """
+
+    band: int = L1
+    other: int = L5
+    filters: DivergenceParams = GROUND
+    p_false_alarm: float = 1e-9
+    min_clock_satellites: int = 3
+    zenith_delay_m: float = 2.4
+    covariance: StatisticCovariance = field(default_factory=StatisticCovariance)
+
+    def __post_init__(self) -> None:
+        for name in ("band", "other"):
+            if getattr(self, name) not in range(N_BANDS):
+                raise ValueError(f"{name} is {getattr(self, name)}: it must be an index of {', '.join(BANDS)}")
+        if self.band == self.other:
+            raise ValueError(f"band and other are both {BANDS[self.band]}: two are needed")
+        if not 0.0 < self.p_false_alarm < 1.0:
+            raise ValueError(f"p_false_alarm is {self.p_false_alarm}: it must be within 0 and 1")
+        if not self.min_clock_satellites >= 1:
+            raise ValueError(f"min_clock_satellites is {self.min_clock_satellites}: it must be at least 1")
+        if not 0.0 <= self.zenith_delay_m <= 5.0:
+            raise ValueError(f"zenith_delay_m is {self.zenith_delay_m}: it must be within 0 to 5 m")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TwoFrequencyInput:
+    """One epoch of all receivers; missing is NaN.
+
+    Attributes
+    ----------
+    code_m, carrier_m : (R, N_BANDS, N) arrays
+        Raw code and carrier ranges [m].
+    restarted : (R, N_BANDS, N) bool array
+        Cycle slips, code jumps and restarts; one on either band restarts all statistics of the channel.
+    range_m, clock_s : (R, N) arrays
+        Expected geometric range [m] and broadcast satellite clock [s].
+    rebased : (N,) bool array
+        Satellites whose expected range jumped now, because another ephemeris came into use.
+    elevation_rad : (N,) array
+    used : (R, N) bool array
+        Receivers averaged for each satellite.
+    clock_used : (R, N) bool array
+        Satellites that may be in the receivers' clocks: not those a monitor has failed.
+    """
+
+    code_m: FloatArray
+    carrier_m: FloatArray
+    restarted: BoolArray
+    range_m: FloatArray
+    clock_s: FloatArray
+    rebased: BoolArray
+    elevation_rad: FloatArray
+    used: BoolArray
+    clock_used: BoolArray
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TwoFrequencyState:
+    """What the monitor remembers.
+
+    Attributes
+    ----------
+    codes : DivergenceState
+        ``(2, R, N)``: DF of both bands.
+    carrier : DivergenceState
+        ``(R, N)``: filters of the compensated IF carrier's rate.
+    residual_m : (R, N) array
+        Last IF carrier less geometry, satellite clock and troposphere [m].
+    clock_m : (R, N) array
+        Receiver clock accumulated since then [m].
+    since_s : (R, N) array
+        Time since then [s].
+    rebased : (N,) bool array
+        Of the last epoch.
+    """
+
+    codes: DivergenceState
+    carrier: DivergenceState
+    residual_m: FloatArray
+    clock_m: FloatArray
+    since_s: FloatArray
+    rebased: BoolArray
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TwoFrequencyEpoch:
+    """Result of one epoch.
+
+    Attributes
+    ----------
+    receiver_mps : (3, R, N) array
+        Filtered DF, DF of the other band and IF carrier of each channel, settled or not [m/s].
+    settled : (R, N) bool array
+        Where all three count.
+    mean_mps : (4, N) array
+        Means over the settled receivers in use, with IF code minus carrier in the paper's third place [m/s].
+    receivers : (N,) array
+        How many those are; 0: the satellite is not monitored.
+    clock_satellites : (N,) array
+        Fewest satellites behind the clock of a receiver averaged.
+    covariance : (N, 3, 3) array
+        Of the sound form's means [(m/s)^2].
+    paper, sound : MonitorResult
+        ``(N,)``: quadratic form against its threshold [-].
+    """
+
+    receiver_mps: FloatArray
+    settled: BoolArray
+    mean_mps: FloatArray
+    receivers: FloatArray
+    clock_satellites: FloatArray
+    covariance: FloatArray
+    paper: MonitorResult
+    sound: MonitorResult
+
+
+def initial_two_frequency(params: TwoFrequencyParams, n_receivers: int) -> TwoFrequencyState:
+    """State of a monitor that has seen nothing."""
+    shape = (n_receivers, N_SATS)
+    return TwoFrequencyState(
+        codes=initial_divergence(params.filters, 2, n_receivers),
+        carrier=initial_divergence(params.filters, n_receivers),
+        residual_m=np.full(shape, np.nan),
+        clock_m=np.zeros(shape),
+        since_s=np.zeros(shape),
+        rebased=np.zeros(N_SATS, dtype=bool),
+    )
+
+
+def two_frequency_step(
+    state: TwoFrequencyState, epoch: TwoFrequencyInput, dt_s: float, params: TwoFrequencyParams
+) -> tuple[TwoFrequencyState, TwoFrequencyEpoch]:
+    """Monitor one epoch.
+
+    Parameters
+    ----------
+    state : TwoFrequencyState
+        From :func:`initial_two_frequency` or the previous step.
+    epoch : TwoFrequencyInput
+    dt_s : float
+        Time since the epoch before, NaN at the first [s].
+    params : TwoFrequencyParams
+    """
+    restarted = epoch.restarted[:, params.band] | epoch.restarted[:, params.other]
+    codes, _, code_rates = divergence_step(
+        state.codes, _divergence_free(epoch, params), restarted, dt_s, params.filters
+    )
+    new, carrier_rate, others = _carrier(state, epoch, restarted, dt_s, params)
+    counts = settled(codes, params.filters).all(axis=0) & settled(new.carrier, params.filters)
+    receiver = np.concatenate([code_rates, carrier_rate[np.newaxis]])
+    averaged = counts & epoch.used
+    rates, count = receiver_mean(receiver.swapaxes(0, 1), averaged[:, np.newaxis])
+    receivers = count[0]
+    n_clock = np.where(averaged, others, np.inf).min(axis=0)
+    covariance = params.covariance.at(epoch.elevation_rad, receivers, n_clock)
+    means = with_iono_free_code(rates, params.band, params.other)
+    result = TwoFrequencyEpoch(
+        receiver_mps=receiver,
+        settled=counts,
+        mean_mps=means,
+        receivers=receivers,
+        clock_satellites=np.where(receivers > 0, n_clock, np.nan),
+        covariance=covariance,
+        paper=upper_limit(paper_form(means, receivers), threshold("paper", params.p_false_alarm), receivers > 0),
+        sound=upper_limit(sound_form(rates, covariance), threshold("sound", params.p_false_alarm), receivers > 0),
+    )
+    return replace(new, codes=codes), result
+
+
+def with_iono_free_code(rates_mps: FloatArray, band: int, other: int) -> FloatArray:
+    """The paper's four statistics (4, ..., N) from the three independent ones (3, ..., N).
+
+    Notes
+    -----
+    ``CMC_IF = gamma/(gamma-1) CMC_DF1 - 1/(gamma-1) CMC_DF5``, and filters and means are linear.
+    """
+    near, far = iono_free_weights(band, other)
+    code, other_code, carrier = rates_mps
+    return np.stack([code, other_code, near * code + far * other_code, carrier])
+
+
+def paper_form(means_mps: FloatArray, receivers: FloatArray) -> FloatArray:
+    """The paper's test metric with its printed covariance over M: ``M x^T pinv(Q) x`` [-].
+
+    Parameters
+    ----------
+    means_mps : (4, N) array
+    receivers : (N,) array
+        M.
+
+    Source: ENC 2015, eq (15) and (18).
+    """
+    return np.asarray(receivers * np.einsum("in,ij,jn->n", means_mps, _PRINTED_INVERSE, means_mps))
+
+
+def sound_form(rates_mps: FloatArray, covariance: FloatArray) -> FloatArray:
+    """``x^T Q^-1 x`` of the three independent statistics [-].
+
+    Parameters
+    ----------
+    rates_mps : (3, N) array
+    covariance : (N, 3, 3) array
+    """
+    known = np.asarray(np.isfinite(rates_mps).all(axis=0) & np.isfinite(covariance).all(axis=(1, 2)))
+    x = np.where(known, rates_mps, 0.0).T[..., np.newaxis]
+    solved = np.linalg.solve(np.where(known[:, np.newaxis, np.newaxis], covariance, np.eye(3)), x)
+    return np.where(known, (x * solved).sum(axis=(1, 2)), np.nan)
+
+
+def _divergence_free(epoch: TwoFrequencyInput, params: TwoFrequencyParams) -> FloatArray:
+    """Divergence-free code minus carrier of both bands, (2, R, N) [m]."""
+    code, carrier = epoch.code_m, epoch.carrier_m
+    a, b = params.band, params.other
+    return np.stack(
+        [
+            divergence_free_cmc(code[:, a], carrier[:, a], carrier[:, b], a, b),
+            divergence_free_cmc(code[:, b], carrier[:, b], carrier[:, a], b, a),
+        ]
+    )
+
+
+def _carrier(
+    state: TwoFrequencyState, epoch: TwoFrequencyInput, restarted: BoolArray, dt_s: float, params: TwoFrequencyParams
+) -> tuple[TwoFrequencyState, FloatArray, FloatArray]:
+    """Rate of the compensated IF carrier, filtered, and the satellites behind each clock, ``(R, N)``."""
+    a, b = params.band, params.other
+    iono_free = ionosphere_free(epoch.carrier_m[:, a], epoch.carrier_m[:, b], a, b)
+    troposphere = params.zenith_delay_m / np.sqrt(_OBLIQUITY + np.sin(epoch.elevation_rad) ** 2)
+    residual = iono_free - epoch.range_m + SPEED_OF_LIGHT_MPS * epoch.clock_s - troposphere
+    since_s = state.since_s + (dt_s if dt_s > 0.0 else np.inf)
+    alive = np.isfinite(state.residual_m) & ~restarted & (since_s <= params.filters.max_gap_s)
+    present = np.isfinite(residual)
+    change = np.where(alive & present & ~epoch.rebased, residual - state.residual_m, np.nan)
+    # Channels measured at the last epoch, too: what they have in common is the clock of this one interval.
+    together = np.isfinite(change) & (state.since_s == 0.0)
+    clock, n_clock = _others_mean(change, together & epoch.clock_used, params.min_clock_satellites)
+    accumulated = state.clock_m + clock
+    rate = (change - accumulated) / since_s
+    # The one epoch at which the expected range jumps tells nothing: the filter goes on with the rate it has.
+    coasting = epoch.rebased & ~state.rebased & alive & present
+    rate = np.where(coasting, state.carrier.f1_mps, rate)
+    carrier, filtered = rate_step(state.carrier, rate, since_s, restarted, dt_s, params.filters)
+    new = TwoFrequencyState(
+        codes=state.codes,
+        carrier=carrier,
+        residual_m=np.where(present, residual, np.where(alive, state.residual_m, np.nan)),
+        clock_m=np.where(present, 0.0, accumulated),
+        since_s=np.where(present, 0.0, since_s),
+        rebased=epoch.rebased,
+    )
+    return new, filtered, n_clock
+
+
+def _others_mean(change_m: FloatArray, member: BoolArray, fewest: int) -> tuple[FloatArray, FloatArray]:
+    """Mean over the other members of the same constellation, and how many they are; NaN below `fewest`.
+
+    Source: ENC 2015, eq (13), with i for the first j.
+    """
+    own = np.where(member, change_m, 0.0)
+    total, count = np.zeros_like(own), np.zeros_like(own)
+    for group in CLOCK_GROUPS:
+        total += np.where(group, (own * group).sum(axis=-1, keepdims=True), 0.0)
+        count += np.where(group, (member & group).sum(axis=-1, keepdims=True), 0)
+    others = count - member
+    return np.where(others >= fewest, (total - own) / np.maximum(others, 1.0), np.nan), others
