@@ -16,7 +16,7 @@ from gbas_core.orbits import predicted_state, rotated_range
 from gbas_core.record import FloatArray
 from gbas_core.recording import Recording
 from gbas_core.satellites import satellites_of
-from gbas_core.signals import L1
+from gbas_core.signals import L1, SPEED_OF_LIGHT_MPS
 from gbas_ground import ephemerides
 from gbas_ground.geometry import expected, site_of
 from gbas_ground.params import GroundParams
@@ -49,6 +49,7 @@ class MonitorEpoch(NamedTuple):
     clock_s: FloatArray
     elevation_rad: FloatArray  # (N,)
     azimuth_rad: FloatArray
+    shift_m: FloatArray  # (R, N), what a new ephemeris makes of a residual
 
 
 def station_of(positions_m: FloatArray, systems: str) -> GroundParams:
@@ -69,12 +70,16 @@ def monitor_epochs(
     groups: tuple[TrackGroup, ...] = initial_tracking(params)
     for key, observations, received in observed:
         week, tow_s = from_epoch_key(key)
+        before = known.current
         for each in received:
             known, _ = ephemerides.receive(known, each, week, tow_s, params)
         known, changed, _ = ephemerides.choose(known, week, tow_s, params)
         raw = stack(observations, satellites_of(params.systems))
         should = expected(known.current, week, tow_s, raw.code_m[:, L1], site)
-        less_clock = np.where(changed, np.nan, should.range_m - 299_792_458.0 * should.clock_s)
+        less_clock = should.range_m - SPEED_OF_LIGHT_MPS * should.clock_s
+        old = expected(before, week, tow_s, raw.code_m[:, L1], site)
+        shift = np.where(changed, old.range_m - SPEED_OF_LIGHT_MPS * old.clock_s - less_clock, 0.0)
+        less_clock = np.where(changed, np.nan, less_clock)
         groups, tracks = track(groups, raw, key, less_clock, params)
         _, los = rotated_range(
             site.positions_m[-1], predicted_state(known.current, week, tow_s, site.positions_m[-1]).position_m
@@ -83,7 +88,7 @@ def monitor_epochs(
         yield MonitorEpoch(
             key, raw.code_m, raw.carrier_m, raw.cn0_dbhz,
             np.repeat((tracks.age_s == 0.0)[:, np.newaxis], raw.code_m.shape[1], axis=1),
-            should.range_m, should.clock_s, should.elevation_rad, azimuths,
+            should.range_m, should.clock_s, should.elevation_rad, azimuths, shift,
         )  # fmt: skip
 
 
