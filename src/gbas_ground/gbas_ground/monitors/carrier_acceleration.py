@@ -116,10 +116,13 @@ class CarrierAccelerationState:
         Carriers without geometry; NaN where there is none, or one that does not belong to the newest [m].
     age_s : (W,) array
         Time before the newest epoch; NaN where there is none [s].
+    unseen_s : (R, F, N) array
+        Time since each carrier was last there; NaN if it never was [s].
     """
 
     residual_m: FloatArray
     age_s: FloatArray
+    unseen_s: FloatArray
 
 
 def initial_carrier_acceleration(n_receivers: int, params: CarrierAccelerationParams) -> CarrierAccelerationState:
@@ -127,6 +130,7 @@ def initial_carrier_acceleration(n_receivers: int, params: CarrierAccelerationPa
     return CarrierAccelerationState(
         residual_m=np.full((params.points, n_receivers, len(params.bands), N_SATS), np.nan),
         age_s=np.full(params.points, np.nan),
+        unseen_s=np.full((n_receivers, len(params.bands), N_SATS), np.nan),
     )
 
 
@@ -196,10 +200,10 @@ def carrier_acceleration_step(
     k = params.multiplier(len(residual_m))
     known = _judged(state.residual_m[..., here], state.age_s, sigma, k, params)
     shape = (len(STATISTICS), *residual_m.shape)
-    values = np.full((2, *shape), np.nan)  # statistics, variances
-    values[..., here] = known.statistic, known.variance
+    values = np.full((3, *shape), np.nan)
+    values[..., here] = known
     wanted = due[:, np.newaxis] & (np.isfinite(residual_m) | (np.arange(len(params.bands)) == 0)[:, np.newaxis])
-    return state, _concluded(values[0], values[1], wanted, k, params)
+    return state, _concluded(_Known(*values), wanted, k, params)
 
 
 def _with_epoch(
@@ -211,21 +215,28 @@ def _with_epoch(
 ) -> CarrierAccelerationState:
     """The newest epoch in front; what does not belong to it is forgotten."""
     goes_on = 0.0 < dt_s <= params.max_gap_s
-    age = np.concatenate([[0.0], (state.age_s + dt_s)[:-1] if goes_on else np.full(params.points - 1, np.nan)])
-    in_window = age <= params.window_s
-    before = state.residual_m[:-1]
-    recent = (age[1:] <= params.max_gap_s)[:, np.newaxis, np.newaxis, np.newaxis]
-    seen = np.logical_or.reduce(np.isfinite(before) & recent, axis=0)
-    kept = seen & ~restarted & in_window[1:, np.newaxis, np.newaxis, np.newaxis]
-    history = np.concatenate([residual_m[np.newaxis], np.where(kept, before, np.nan)])
-    return CarrierAccelerationState(residual_m=history, age_s=np.where(in_window, age, np.nan))
+    age = np.concatenate([[0.0], state.age_s[:-1] + dt_s])
+    unseen = state.unseen_s + dt_s
+    history = np.concatenate([residual_m[np.newaxis], state.residual_m[:-1]])
+    in_window = age <= params.window_s if goes_on else np.arange(params.points) == 0
+    if not in_window.all():
+        history[~in_window] = np.nan
+    lost = (restarted | (unseen > params.max_gap_s)) & np.isfinite(unseen)
+    if lost.any():
+        history[1:, lost] = np.nan
+    return CarrierAccelerationState(
+        residual_m=history,
+        age_s=np.where(in_window, age, np.nan),
+        unseen_s=np.where(np.isfinite(residual_m), 0.0, unseen),
+    )
 
 
 class _Known(NamedTuple):
-    """Statistics and variances ``(S, R, F, n)``."""
+    """Statistics, variances and thresholds, ``(S, R, F, n)``."""
 
     statistic: FloatArray
     variance: FloatArray
+    threshold: FloatArray
 
 
 def _judged(
@@ -238,25 +249,28 @@ def _judged(
     """
     change = history_m - history_m[0]
     there = np.isfinite(change)
-    complete = there | ~there.any(axis=-1, keepdims=True)
-    in_set = complete.all(axis=0) & there[0] & np.isfinite(sigma_m)
-    time_s = np.where(np.isfinite(age_s), -age_s, 0.0)
+    change = np.where(there, change, 0.0)
+    powers = np.where(np.isfinite(age_s), -age_s, 0.0) ** np.arange(5)[:, np.newaxis]
+    s = (powers @ there.reshape(len(there), sigma_m.size).astype(np.float64)).reshape(5, *sigma_m.shape)
+    epochs = there.any(axis=-1, keepdims=True).sum(axis=0)
+    in_set = (s[0] == epochs) & there[0] & (sigma_m > 0.0)
     while True:
-        known = _statistics(change, there, time_s, sigma_m, in_set, params)
-        ratio = np.max(np.abs(known.statistic) / _thresholds(known.variance, k, params), axis=0, initial=0.0)
-        ratio = np.where(in_set, ratio, 0.0)  # NaN only where the set is too small, and then everywhere
-        if not (ratio > 1.0).any():
+        known = _statistics(change, there, powers[:3], s, sigma_m, in_set, k, params)
+        ratio = (np.abs(known.statistic) / known.threshold).max(axis=0)
+        beyond = in_set & (ratio > 1.0)
+        if not beyond.any():
             return known
-        worst = ratio == ratio.max(axis=-1, keepdims=True)
-        in_set = in_set & ~(worst & (ratio > 1.0))
+        in_set = in_set & ~(beyond & (ratio == np.where(beyond, ratio, 0.0).max(axis=-1, keepdims=True, initial=0.0)))
 
 
 def _statistics(
     change_m: FloatArray,
     there: BoolArray,
-    time_s: FloatArray,
+    powers: FloatArray,
+    s: FloatArray,
     sigma_m: FloatArray,
     in_set: BoolArray,
+    k: float,
     params: CarrierAccelerationParams,
 ) -> _Known:
     """Least squares of each channel over the epochs it has; times count back from the newest, at zero.
@@ -265,38 +279,40 @@ def _statistics(
     -----
     With weights w_i in the clock, (phi_i - clock) / (1 - w_i) is phi_i less the mean of the others.
     """
-    weight = np.where(in_set, 1.0 / sigma_m**2, 0.0)
+    weight = np.where(in_set, sigma_m**-2, 0.0)
     total = weight.sum(axis=-1, keepdims=True)
-    enough = in_set.sum(axis=-1, keepdims=True) - in_set >= params.min_satellites
     share = weight / np.where(total > 0.0, total, 1.0)
-    clock = np.einsum("wrfn,rfn->wrf", np.where(there & in_set, change_m, 0.0), share)
-    others = np.where(enough, total - weight, np.nan)
-    free = np.where(there, change_m - clock[..., np.newaxis], 0.0) / (1.0 - share)
-    powers = time_s ** np.arange(5)[:, np.newaxis]
-    s = np.tensordot(powers, there.astype(np.float64), axes=1)
-    m = np.tensordot(powers[:3], free, axes=1)
-    variance = sigma_m**2 + 1.0 / others
-    return _Known(*_solved(s, m, variance, params.least_points))
+    clock = (change_m * share).sum(axis=-1, keepdims=True)  # the set has every epoch its receiver has
+    free = (change_m - clock) * there / (1.0 - share)
+    m = (powers @ free.reshape(len(free), sigma_m.size)).reshape(3, *sigma_m.shape)
+    enough = in_set.sum(axis=-1, keepdims=True) - in_set >= params.min_satellites
+    variance = sigma_m**2 + 1.0 / np.where(enough, total - weight, np.nan)
+    statistic, gain = _solved(s, m, params.least_points)
+    # what has no variance has no statistic
+    spread = gain * variance
+    return _Known(np.where(np.isnan(spread), np.nan, statistic), spread, _thresholds(spread, k, params))
 
 
-def _solved(s: FloatArray, m: FloatArray, variance_m2: FloatArray, least_points: int) -> tuple[FloatArray, FloatArray]:
-    """Step, rate and acceleration, and their variances, from the sums s_k = sum t^k and m_k = sum t^k y.
+def _solved(s: FloatArray, m: FloatArray, least_points: int) -> tuple[FloatArray, FloatArray]:
+    """Step, rate and acceleration, and their variances for a variance of one, from sums of t^k and of t^k y.
 
     The newest epoch, at t = 0 with y = 0, is part of s_0 alone.
     """
     judged = s[0] >= least_points
-    before = s[0] - 1.0
-    line = np.where(judged, before * s[2] - s[1] ** 2, np.nan)
-    step = -(s[2] * m[0] - s[1] * m[1]) / line
     slope = np.where(judged, s[0] * s[2] - s[1] ** 2, np.nan)
-    rate = (s[0] * m[1] - s[1] * m[0]) / slope
+    line = slope - s[2]  # the same without the newest
     # Cramer's rule for the coefficient of t^2, half the acceleration; the minors are those of its column.
     minor0 = s[1] * s[3] - s[2] ** 2
     minor1 = s[0] * s[3] - s[1] * s[2]
     parabola = minor0 * s[2] - minor1 * s[3] + slope * s[4]
-    acceleration = 2.0 * (minor0 * m[0] - minor1 * m[1] + slope * m[2]) / parabola
-    gain = np.stack([1.0 + s[2] / line, s[0] / slope, 4.0 * slope / parabola])
-    return np.stack([step, rate, acceleration]), gain * variance_m2
+    statistic = np.stack(
+        [
+            (s[1] * m[1] - s[2] * m[0]) / line,
+            (s[0] * m[1] - s[1] * m[0]) / slope,
+            2.0 * (minor0 * m[0] - minor1 * m[1] + slope * m[2]) / parabola,
+        ]
+    )
+    return statistic, np.stack([1.0 + s[2] / line, s[0] / slope, 4.0 * slope / parabola])
 
 
 def _thresholds(variance: FloatArray, k: float, params: CarrierAccelerationParams) -> FloatArray:
@@ -306,19 +322,19 @@ def _thresholds(variance: FloatArray, k: float, params: CarrierAccelerationParam
 
 
 def _concluded(
-    statistic: FloatArray, variance: FloatArray, wanted: BoolArray, k: float, params: CarrierAccelerationParams
+    known: _Known, wanted: BoolArray, k: float, params: CarrierAccelerationParams
 ) -> CarrierAccelerationResult:
-    channels = upper_limit(
-        np.abs(statistic), _thresholds(variance, k, params), np.broadcast_to(wanted, statistic.shape)
-    )
+    statistic = known.statistic
+    size = np.abs(statistic)
+    channels = upper_limit(size, known.threshold, wanted[np.newaxis])
     there = np.isfinite(statistic[0])
-    beyond = np.logical_or.reduce(np.abs(statistic) > channels.threshold, axis=0)  # (R, F, N)
+    beyond = np.logical_or.reduce(size > known.threshold, axis=0)  # (R, F, N)
     number = beyond.sum(axis=0)
     alone = (number == 1) & (there.sum(axis=0) >= 3)
     taken = there & ~(beyond & alone)
     count = np.maximum(taken.sum(axis=0), 1)
     mean = np.where(taken.any(axis=0), np.where(taken, statistic, 0.0).sum(axis=1) / count, np.nan)
-    spread = np.where(taken, variance, 0.0).sum(axis=1) / count**2
+    spread = np.where(taken, known.variance, 0.0).sum(axis=1) / count**2
     due = np.broadcast_to(wanted.any(axis=0), mean.shape)
     averaged = upper_limit(np.abs(mean), _thresholds(spread, k, params), due)
     blamed = (number >= 1) & ~alone & due[0]
@@ -360,8 +376,7 @@ def fault_response(
     signal = {"step": (since_s >= age).astype(np.float64), "ramp": grown, "acceleration": 0.5 * grown**2}[fault]
     change = signal - signal[0]
     powers = (-age) ** np.arange(5)[:, np.newaxis]
-    found, _ = _solved(powers.sum(axis=1), powers[:3] @ change, np.array(1.0), params.least_points)
-    return found
+    return _solved(powers.sum(axis=1), powers[:3] @ change, params.least_points)[0]
 
 
 def detectable_fault(
@@ -390,7 +405,7 @@ def detectable_fault(
     ages = np.arange(round(since_s / interval_s) + 1) * interval_s
     age = np.arange(min(params.points, int(params.window_s / interval_s) + 1)) * interval_s
     sums = ((-age) ** np.arange(5)[:, np.newaxis]).sum(axis=1)
-    _, variance = _solved(sums, np.zeros(3), np.array(sigma_m**2 / n_receivers), params.least_points)
+    variance = _solved(sums, np.zeros(3), params.least_points)[1] * sigma_m**2 / n_receivers
     needed = _thresholds(variance, params.multiplier(n_receivers), params)
     needed = needed + k_md * np.sqrt(variance + np.array(params.common) ** 2)
     with np.errstate(divide="ignore"):
