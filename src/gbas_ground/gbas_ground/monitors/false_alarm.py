@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Final
 
 from scipy.stats import norm
@@ -15,6 +16,7 @@ EPOCH_S: Final = 0.5
 """Interval between a ground station's epochs [s]. Known."""
 
 
+@lru_cache(maxsize=64)
 def false_alarm_multiplier(
     probability: float = FALSE_EXCLUSION, *, tests: int = 1, sides: int = 2, interval_s: float = EPOCH_S
 ) -> float:

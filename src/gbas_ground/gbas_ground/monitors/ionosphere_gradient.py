@@ -164,7 +164,8 @@ class GradientResult:
     coverage : (N,) array
         Share of the range that the satellite's baselines detect now, along the worst runway.
     gradient : (N,) array
-        Smallest gradient along the first runway that explains the statistics [m/m]; others: :func:`gradient_set`.
+        Of satellites that exceeded a threshold: the smallest gradient along the first runway that explains all their
+        double differences [m/m]; NaN if none does. The others that do: :func:`gradient_set`.
     """
 
     verdict: MonitorResult
@@ -207,7 +208,7 @@ def check_ionosphere_gradient(
         by_baseline=by_baseline,
         monitored=monitored,
         coverage=coverage,
-        gradient=_smallest_gradient(differences, looked, site.length_m[0], params.bands),
+        gradient=_smallest_gradients(exceeded, differences, looked, site.length_m[0], params.bands),
     )
 
 
@@ -240,7 +241,7 @@ def _coverage(
     level = np.max(np.where(looked, sigma_m, 0.0) / shape[..., np.newaxis], axis=(0, 1), initial=0.0)
     rounded = np.ceil(np.log(np.where(level > 0.0, level, 1.0)) / np.log(_LEVEL)).astype(np.int64)
     bits = np.int64(1) << np.arange(shape.size, dtype=np.int64)
-    code = bits @ looked.reshape(shape.size, -1)
+    code = bits @ looked.reshape(shape.size, looked.shape[-1])
     result = np.zeros(code.shape)
     for satellite in np.flatnonzero(code):
         key = int(rounded[satellite]) << shape.size | int(code[satellite])
@@ -253,7 +254,7 @@ def _coverage(
 
 def _relative_sigma(site: GradientSite, params: IonosphereGradientParams) -> FloatArray:
     """How sigmas of baselines and bands compare, (B, F), as at low elevations."""
-    factors = params.noise.factors(len(site.baselines.height_m))
+    factors = params.noise.factors(len(site.baselines.place_m))
     scale = np.hypot(factors[site.baselines.first], factors[site.baselines.second])
     low = np.array([params.noise.low_m[band] for band in params.bands])
     return np.asarray(np.outer(scale, low) / low[0])
@@ -329,15 +330,17 @@ def blind_gradients(
     return _blind(_monitors(code, sigma, site.length_m[runway], params), site.k_ffd + site.k_md, params)
 
 
-def _smallest_gradient(
-    differences: DoubleDifferences, looked: BoolArray, length_m: FloatArray, bands: tuple[int, ...]
+def _smallest_gradients(
+    exceeded: BoolArray, differences: DoubleDifferences, looked: BoolArray, length_m: FloatArray, bands: tuple[int, ...]
 ) -> FloatArray:
-    """Weighted least squares over baselines and bands, every double difference taken as it is."""
-    slope = (length_m[:, np.newaxis] * IONO_RATIO[list(bands)])[..., np.newaxis]
-    weight = np.where(looked, slope / differences.sigma_m**2, 0.0)
-    normal = (weight * slope).sum(axis=(0, 1))
-    total = -(weight * np.where(looked, differences.residual_m, 0.0)).sum(axis=(0, 1))
-    return np.asarray(np.where(normal > 0.0, total / np.where(normal > 0.0, normal, 1.0), np.nan))
+    """First of :func:`gradient_set` for the satellites that exceeded a threshold, (N,); NaN for the others."""
+    result = np.full(exceeded.shape, np.nan)
+    for satellite in np.flatnonzero(exceeded):
+        own = np.where(looked[..., satellite], differences.residual_m[..., satellite], np.nan)
+        explained = gradient_set(own, differences.sigma_m[..., satellite], length_m, bands)
+        if explained.size:
+            result[satellite] = explained[0]
+    return result
 
 
 def gradient_set(
