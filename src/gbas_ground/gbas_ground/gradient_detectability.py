@@ -101,7 +101,7 @@ def k_factor(p_false_alarm: float = P_FALSE_ALARM, p_missed_detection: float = P
     return float(norm.isf(0.5 * p_false_alarm) + norm.isf(p_missed_detection))
 
 
-def double_difference_sigma_m(reference_sigma_m: ArrayLike, ratio: ArrayLike = 1.0) -> FloatArray:
+def double_difference_sigma_m(reference_sigma_m: FloatArray | float, ratio: ArrayLike = 1.0) -> FloatArray:
     """Sigma of the double difference from the carrier sigma of the reference receiver [m].
 
     Parameters
@@ -136,7 +136,7 @@ def projected_length_m(baseline_enu_m: ArrayLike, runway_bearing_rad: float) -> 
     return result
 
 
-def wrap_m(value_m: ArrayLike, wavelength_m: ArrayLike) -> FloatArray:
+def wrap_m(value_m: ArrayLike, wavelength_m: FloatArray | float) -> FloatArray:
     """What is left of a double difference when the nearest multiple of the wavelength is taken off [m].
 
     Parameters
@@ -265,8 +265,8 @@ def _tents(monitor: BaselineMonitor, k: float, gradient_range: tuple[float, floa
         return np.empty((0, 2))
     multiple = np.arange(math.floor(low * slope / wavelength), math.floor(high * slope / wavelength) + 1.0) * wavelength
     ends = np.stack([multiple + margin, multiple + (wavelength - margin)], axis=-1) / slope
-    ends = np.clip(ends, low, high)
-    return ends[ends[:, 0] < ends[:, 1]]
+    clipped: FloatArray = np.clip(ends, low, high)
+    return clipped[clipped[:, 0] < clipped[:, 1]]
 
 
 def _union(intervals: FloatArray) -> FloatArray:
@@ -284,4 +284,5 @@ def _complement(intervals: FloatArray, gradient_range: tuple[float, float]) -> F
     """What sorted, disjoint intervals leave of the range."""
     low, high = gradient_range
     gaps = np.stack([np.append(low, intervals[:, 1]), np.append(intervals[:, 0], high)], axis=-1)
-    return gaps[gaps[:, 1] - gaps[:, 0] > _ROUNDING * high]
+    kept: FloatArray = gaps[gaps[:, 1] - gaps[:, 0] > _ROUNDING * high]
+    return kept
