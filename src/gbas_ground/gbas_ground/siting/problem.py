@@ -139,7 +139,8 @@ class SitingProblem:
     @cached_property
     def wavelength_m(self) -> FloatArray:
         """Wavelength of each monitor: all baselines on the first band, then all on the next ``(c,)`` [m]."""
-        return np.repeat(WAVELENGTH_M[list(self.bands)], len(self.pairs))
+        result: FloatArray = np.repeat(WAVELENGTH_M[list(self.bands)], len(self.pairs))
+        return result
 
     @cached_property
     def slack_m(self) -> FloatArray:

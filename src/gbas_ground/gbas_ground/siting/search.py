@@ -47,6 +47,8 @@ class Siting:
         A gradient along the runway that has the statistic D [m/m].
     evaluations : int
         Sets of places and boxes that were computed.
+    closed : bool
+        Whether the search ended by closing the gap.
     """
 
     problem: SitingProblem
@@ -55,6 +57,7 @@ class Siting:
     bound_m: float
     worst_gradient: float
     evaluations: int
+    closed: bool
 
     @property
     def sigma_m(self) -> float:
@@ -70,6 +73,11 @@ class Siting:
     def length_m(self) -> float:
         """Longest monitored baseline, along the runway [m]."""
         return float(self.baselines_m.max())
+
+    @property
+    def length_limited(self) -> bool:
+        """Whether a new receiver stands at the length limit: more length could allow more."""
+        return bool((np.abs(self.new_m) >= self.problem.length_limit_m * (1.0 - 1e-9)).any())
 
     @property
     def baselines_m(self) -> FloatArray:
@@ -135,11 +143,11 @@ def best_siting(problem: SitingProblem, *, gap_m: float = GAP_M, budget: int = B
     search = _Search(problem, best_m=np.zeros(problem.n_new))
     if problem.n_new == 0:
         search.offer(np.zeros((1, 0)))
-        return _siting(search, search.statistic_m)
+        return _siting(search, search.statistic_m, gap_m)
     search.offer(np.clip(_chain(problem), low, high))
     bound = _branch_and_bound(search, low, high, gap_m, budget)
     search.best_m = np.sort(search.best_m)
-    return _siting(search, bound)
+    return _siting(search, bound, gap_m)
 
 
 def _chain(problem: SitingProblem) -> FloatArray:
@@ -180,7 +188,7 @@ def _halved(low_m: FloatArray, high_m: FloatArray) -> tuple[FloatArray, FloatArr
     return low[ordered], high[ordered]
 
 
-def _siting(search: _Search, bound_m: float) -> Siting:
+def _siting(search: _Search, bound_m: float, gap_m: float) -> Siting:
     problem = search.problem
     new_m = search.best_m if problem.two_sided else search.best_m * _side(problem)
     worst = problem.guaranteed(new_m[np.newaxis])
@@ -191,6 +199,7 @@ def _siting(search: _Search, bound_m: float) -> Siting:
         bound_m=max(bound_m, float(worst.statistic_m[0])),
         worst_gradient=float(worst.gradient[0]),
         evaluations=search.evaluations,
+        closed=bound_m <= search.statistic_m + gap_m,
     )
 
 
