@@ -295,7 +295,9 @@ def process(
 def bench(
     part: Annotated[
         list[str] | None,
-        typer.Option(help="Only this: steps, simulator, offline, process, latency, replay or files; may be repeated."),
+        typer.Option(
+            help="Only this: steps, simulator, siting, offline, process, latency, replay or files; may be repeated."
+        ),
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Short runs: less exact.")] = False,
     seconds: Annotated[float | None, typer.Option(help="Duration of the latency run (default: 40).")] = None,

@@ -264,7 +264,8 @@ def _tents(monitor: BaselineMonitor, k: float, gradient_range: tuple[float, floa
     if slope == 0.0 or 2.0 * margin >= wavelength:
         return np.empty((0, 2))
     multiple = np.arange(math.floor(low * slope / wavelength), math.floor(high * slope / wavelength) + 1.0) * wavelength
-    ends = np.stack([multiple + margin, multiple + (wavelength - margin)], axis=-1) / slope
+    with np.errstate(over="ignore"):  # the first tent of a baseline of next to nothing ends far outside the range
+        ends = np.stack([multiple + margin, multiple + (wavelength - margin)], axis=-1) / slope
     clipped: FloatArray = np.clip(ends, low, high)
     return clipped[clipped[:, 0] < clipped[:, 1]]
 

@@ -134,7 +134,8 @@ class SitingProblem:
     @cached_property
     def _gain(self) -> FloatArray:
         """Ionosphere on each band, one column a band."""
-        return IONO_RATIO[list(self.bands)][:, np.newaxis]
+        result: FloatArray = IONO_RATIO[list(self.bands), np.newaxis]
+        return result
 
     @cached_property
     def wavelength_m(self) -> FloatArray:
@@ -145,7 +146,8 @@ class SitingProblem:
     @cached_property
     def slack_m(self) -> FloatArray:
         """What the placement tolerance takes off each monitor ``(c,)`` [m]."""
-        return self.width_m(np.full((1, self.n_new), self.tolerance_m))[0]
+        slack: FloatArray = self.width_m(np.full((1, self.n_new), self.tolerance_m))[0]
+        return slack
 
     def slope_m(self, new_m: FloatArray) -> FloatArray:
         """Delay over each monitored baseline per unit gradient ``(n, c)`` for places ``(n, n_new)`` [m]."""
