@@ -7,6 +7,7 @@ so; budgets are the suite's own.
 ==========  ===========================================================================================================
 steps       processor time of the steps of one epoch, offline, against their budgets and the VDB's frame of 500 ms
 simulator   an hour of simulated observations, against a bound of 20 s
+siting      places of three reference receivers judged exactly, against 5 million a second; whole searches
 offline     the whole chain without ROS as a multiple of real time
 process     ``gbas process`` on recorded files as a multiple of real time, and against RTKLIB on the same files
 latency     live nodes at 2 Hz: from observations to bursts and to protection levels, against 50 ms
@@ -33,11 +34,12 @@ from gbas_bringup.bench_figures import Part, document, environment
 from gbas_bringup.cli_base import data_folder
 from gbas_bringup.errors import GbasError
 
-PARTS: Final = ("steps", "simulator", "offline", "process", "latency", "replay", "files")
+PARTS: Final = ("steps", "simulator", "siting", "offline", "process", "latency", "replay", "files")
 LATENCY_S: Final = 40.0
 QUICK_LATENCY_S: Final = 8.0
 _STEP_EPOCHS: Final = (300, 60)
 _WORLD_EPOCHS: Final = (1000, 100)
+_SITING_CANDIDATES: Final = (4_000_000, 1_000_000)
 _REPLAY_EPOCHS: Final = (1200, 300)
 _BUSY_LOAD: Final = 0.5
 
@@ -95,7 +97,7 @@ def run_bench(
 
 def _measures(out: Path, quick: bool, seconds: float | None, data: Path | None) -> Mapping[str, Callable[[], Part]]:
     """What measures each part; the libraries are loaded when they are needed."""
-    from gbas_bringup import bench_live, bench_offline, bench_peer, bench_sim
+    from gbas_bringup import bench_live, bench_offline, bench_peer, bench_sim, bench_siting
 
     make_flight = cache(bench_offline.make_flight)
     step_epochs = bench_offline.SETTLE_EPOCHS + _STEP_EPOCHS[quick]
@@ -103,6 +105,7 @@ def _measures(out: Path, quick: bool, seconds: float | None, data: Path | None) 
     return {
         "steps": lambda: bench_offline.measure_steps(make_flight(step_epochs)),
         "simulator": lambda: bench_sim.measure_worlds(_WORLD_EPOCHS[quick]),
+        "siting": lambda: bench_siting.measure_siting(_SITING_CANDIDATES[quick]),
         "offline": lambda: bench_offline.measure_chain(make_flight(step_epochs)),
         "process": lambda: bench_peer.measure_process(data, repeats=1 if quick else 3),
         "latency": lambda: bench_live.measure_latency(out / "latency", seconds=latency_s),

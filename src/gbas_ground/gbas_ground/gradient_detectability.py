@@ -30,7 +30,7 @@ from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from gbas_core.record import FloatArray
 from gbas_core.signals import IONO_RATIO, L1, WAVELENGTH_M
@@ -98,7 +98,7 @@ def k_factor(p_false_alarm: float = P_FALSE_ALARM, p_missed_detection: float = P
 
     Source: the paper, eq (3) and (5).
     """
-    return float(norm.isf(0.5 * p_false_alarm) + norm.isf(p_missed_detection))
+    return -float(ndtri(0.5 * p_false_alarm) + ndtri(p_missed_detection))
 
 
 def double_difference_sigma_m(reference_sigma_m: FloatArray | float, ratio: ArrayLike = 1.0) -> FloatArray:
@@ -264,7 +264,8 @@ def _tents(monitor: BaselineMonitor, k: float, gradient_range: tuple[float, floa
     if slope == 0.0 or 2.0 * margin >= wavelength:
         return np.empty((0, 2))
     multiple = np.arange(math.floor(low * slope / wavelength), math.floor(high * slope / wavelength) + 1.0) * wavelength
-    ends = np.stack([multiple + margin, multiple + (wavelength - margin)], axis=-1) / slope
+    with np.errstate(over="ignore"):  # the first tent of a baseline of next to nothing ends far outside the range
+        ends = np.stack([multiple + margin, multiple + (wavelength - margin)], axis=-1) / slope
     clipped: FloatArray = np.clip(ends, low, high)
     return clipped[clipped[:, 0] < clipped[:, 1]]
 
