@@ -1,15 +1,16 @@
 """RINEX observation and navigation files as arrays on the satellite axis.
 
-The only part of the suite that reads GNSS files, and the only one that knows the parser (sidereon). It reads RINEX 2,
-3 and 4, plain or gzip, observations also in compact form (CRINEX). Whatever cannot be understood is refused with a
-:class:`RinexError` that names the file; whatever is left out of the result is said in `notes`.
+With :mod:`gbas_core.rtcm` the only part of the suite that reads GNSS files and knows the parser (sidereon). It reads
+RINEX 2, 3 and 4, plain or gzip, observations also in compact form (CRINEX). Whatever cannot be understood is refused
+with a :class:`RinexError` that names the file; whatever is left out of the result is said in `notes`.
 
 Source: RINEX 2.11, 3.05 and 4.02 (IGS/RTCM).
 """
 
 from gbas_core.rinex.navigation import NavigationFile, read_navigation
-from gbas_core.rinex.observations import DEFAULT_SIGNALS, ObservationFile, SignalChoice, SignalTable, read_observations
+from gbas_core.rinex.observations import ObservationFile, read_observations
 from gbas_core.rinex.text import RinexError
+from gbas_core.tracking import DEFAULT_SIGNALS, SignalChoice, SignalTable
 
 __all__ = [
     "RinexError",

@@ -12,12 +12,15 @@ import sidereon
 from numpy.typing import NDArray
 
 from gbas_core.ephemeris import FIELDS, VALIDITY_S, Ephemeris, NavigationMessage
+from gbas_core.files import PathLike
 from gbas_core.gpstime import SECONDS_PER_WEEK, calendar_text, from_epoch_key
 from gbas_core.record import FloatArray
-from gbas_core.rinex.text import PathLike, RinexError, checked_version, parser_problem, read_text, says_simulated
+from gbas_core.rinex.text import RinexError, checked_version, parser_problem, read_text, says_simulated
 from gbas_core.satellites import IS_GPS, N_SATS, SAT_INDEX
 
 IntArray = NDArray[np.int64]
+NavigationRow = tuple[int, list[float], float]
+"""Place on the satellite axis, fields of :class:`Ephemeris`, and transmission time since the start of GPS time [s]."""
 
 SETTLED_BEFORE_FIRST_EPOCH_S: Final = 120.0
 """How long before the first epoch a receiver counts as having received what was valid then."""
@@ -201,8 +204,6 @@ def read_navigation(
     positive ("no accuracy prediction", or nothing) is NaN. A GPS IODC whose low 8 bits are not the IODE is NaN, since
     such a record mixes two data sets.
     """
-    if galileo not in _PREFERENCES:
-        raise ValueError(f"galileo: {galileo!r}; expected 'inav' or 'fnav'")
     files = tuple(Path(path) for path in ([paths] if isinstance(paths, str | Path) else paths))
     if not files:
         raise ValueError("paths: no navigation file given")
@@ -211,6 +212,22 @@ def read_navigation(
     records = [row for rows, _ in parts for row in rows]
     if not records:
         raise RinexError(", ".join(map(str, files)), "has no GPS LNAV or Galileo record; expected at least one")
+    labelled = any(labelled for _, labelled in parts)
+    return navigation_of(files, records, galileo=galileo, simulated=simulated or labelled, notes=notes)
+
+
+def navigation_of(
+    paths: tuple[Path, ...], records: Sequence[NavigationRow], *, galileo: str, simulated: bool, notes: Sequence[str]
+) -> NavigationFile:
+    """The records of some files, at least one, in order and without repeats; `galileo` as in :func:`read_navigation`.
+
+    Raises
+    ------
+    ValueError
+        For another `galileo`.
+    """
+    if galileo not in _PREFERENCES:
+        raise ValueError(f"galileo: {galileo!r}; expected 'inav' or 'fnav'")
     satellite = np.array([row[0] for row in records], dtype=np.int64)
     values = np.array([row[1] for row in records])
     transmitted = np.array([row[2] for row in records])
@@ -219,16 +236,16 @@ def read_navigation(
     for array in (satellite, values, transmitted):
         array.flags.writeable = False
     return NavigationFile(
-        paths=files,
+        paths=paths,
         satellite=satellite,
         values=values,
         transmitted_s=transmitted,
-        simulated=simulated or any(labelled for _, labelled in parts),
+        simulated=simulated,
         notes=tuple(notes),
     )
 
 
-def _records_of(path: Path, notes: list[str]) -> tuple[list[tuple[int, list[float], float]], bool]:
+def _records_of(path: Path, notes: list[str]) -> tuple[list[NavigationRow], bool]:
     """Satellite, field values and transmission time of each usable record of one file; whether it is simulated."""
     own_notes: list[str] = []
     text = read_text(path, own_notes)
@@ -255,7 +272,7 @@ def _records_of(path: Path, notes: list[str]) -> tuple[list[tuple[int, list[floa
     return rows, says_simulated(text)
 
 
-def _record_values(record: Any) -> tuple[int, list[float], float]:
+def _record_values(record: Any) -> NavigationRow:
     elements, clock, delays = record.elements, record.clock, record.group_delays
     is_gps = record.message.label == "gps_lnav"
     toc_s = record.toc_week * SECONDS_PER_WEEK + record.toc_tow_s
@@ -266,7 +283,7 @@ def _record_values(record: Any) -> tuple[int, list[float], float]:
     values |= {
         "message": _MESSAGES[record.message.label],
         "iod": record.issue,
-        "iodc": _checked_iodc(record.iodc, record.issue) if is_gps else None,
+        "iodc": checked_iodc(record.iodc, record.issue) if is_gps else None,
         "toe_week": toe_week,
         "toe_tow_s": toe_tow_s,
         "toc_week": record.toc_week,
@@ -285,7 +302,8 @@ def _record_values(record: Any) -> tuple[int, list[float], float]:
     return SAT_INDEX[record.satellite], row, _transmission_s(record.transmission_time_sow, toe_s)
 
 
-def _checked_iodc(iodc: float | None, iode: int | None) -> float | None:
+def checked_iodc(iodc: float | None, iode: int | None) -> float | None:
+    """The IODC, unless its low 8 bits are not the IODE."""
     if iodc is None or iode is None:
         return None
     if iodc >= _SCALED_IODC and iodc % _SCALED_IODC == 0:

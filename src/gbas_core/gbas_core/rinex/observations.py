@@ -10,29 +10,31 @@ from typing import Any, Final
 
 import numpy as np
 import sidereon
-from numpy.typing import NDArray
 
+from gbas_core.files import PathLike
 from gbas_core.gpstime import MILLISECONDS_PER_WEEK, calendar_text, epoch_key, from_epoch_key, gps_from_calendar
 from gbas_core.observations import ObservationEpoch
 from gbas_core.record import FloatArray
-from gbas_core.rinex.text import SIMULATED_LABEL, PathLike, RinexError, checked_version, parser_problem, read_text
-from gbas_core.satellites import N_SATS, SAT_INDEX
-from gbas_core.signals import BAND_INDEX, BANDS, N_BANDS, WAVELENGTH_M
+from gbas_core.rinex.text import SIMULATED_LABEL, RinexError, checked_version, parser_problem, read_text
+from gbas_core.satellites import SAT_INDEX
+from gbas_core.signals import BAND_INDEX, WAVELENGTH_M
+from gbas_core.tracking import (
+    CARRIER,
+    CN0,
+    CODE,
+    DEFAULT_SIGNALS,
+    DOPPLER,
+    LLI,
+    FlatValues,
+    IntArray,
+    SignalChoice,
+    SignalTable,
+    columns_of_signals,
+    wanted_codes,
+)
 
-IntArray = NDArray[np.int64]
-SignalTable = Mapping[tuple[str, str], Sequence[str]]
+_SYSTEMS: Final[dict[str, Any]] = {"G": sidereon.GnssSystem.GPS, "E": sidereon.GnssSystem.GALILEO}
 
-DEFAULT_SIGNALS: Final[SignalTable] = {
-    ("G", "L1"): ("1C", "1W", "1P"),
-    ("G", "L2"): ("2W", "2L", "2S", "2X", "2C", "2P"),
-    ("G", "L5"): ("5Q", "5I", "5X"),
-    ("E", "L1"): ("1C", "1B", "1X"),
-    ("E", "L5"): ("5Q", "5I", "5X"),
-}
-"""Tracking codes (RINEX 3 band and attribute) by system and band, the preferred first."""
-
-_CODE, _CARRIER, _DOPPLER, _CN0, _LLI = range(5)
-_QUANTITY_LETTERS: Final = "CLDS"
 _GPS_SCALES: Final = ("GPST", "GST")  # Galileo time equals GPS time within tens of nanoseconds
 _TAG_TOLERANCE_S: Final = 1e-6
 _INTERVAL_TOLERANCE_S: Final = 0.001
@@ -44,16 +46,6 @@ _EPOCH_LINE_2: Final = re.compile(r"^ [ \d]\d [ \d]\d [ \d]\d [ \d]\d [ \d]\d [ 
 _EPOCH_LINE_3: Final = re.compile(r"^>", re.MULTILINE)
 _CRINEX_LABEL: Final = "CRINEX VERS   / TYPE"
 _MAX_CRINEX_LINES_PER_EPOCH: Final = 200
-
-
-@dataclass(frozen=True, kw_only=True)
-class SignalChoice:
-    """The observation codes taken for one system and band; None where the file has none."""
-
-    code: str | None
-    carrier: str | None
-    doppler: str | None
-    cn0: str | None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -175,11 +167,11 @@ def read_observations(
     header = parsed.header
     _check_time_scale(path, header)
     epochs = _Epochs.of(path, parsed.epochs, notes)
-    chosen, arrays = _dense(_flat_values(parsed, epochs, signals), len(epochs.keys), signals)
-    _set_loss_of_lock(arrays[_LLI], arrays[_CARRIER], epochs)
-    if header.signal_strength_unit != "DBHZ" and version < 3.0 and np.isfinite(arrays[_CN0]).any():
+    chosen, arrays = columns_of_signals(_flat_values(parsed, epochs, signals), len(epochs.keys), signals)
+    _set_loss_of_lock(arrays[LLI], arrays[CARRIER], epochs)
+    if header.signal_strength_unit != "DBHZ" and version < 3.0 and np.isfinite(arrays[CN0]).any():
         notes.append("signal strengths are in the receiver's own unit (no SIGNAL STRENGTH UNIT DBHZ) and left out")
-        arrays[_CN0][:] = np.nan
+        arrays[CN0][:] = np.nan
     _note_early_end(path, header, epochs.keys, notes)
     week, milliseconds = np.divmod(epochs.keys, MILLISECONDS_PER_WEEK)
     tow_s = milliseconds / 1000.0
@@ -194,11 +186,11 @@ def read_observations(
         interval_s=_interval_s(header, epochs.keys, notes),
         gps_week=week,
         tow_s=tow_s,
-        code_m=arrays[_CODE],
-        carrier_m=arrays[_CARRIER],
-        doppler_hz=arrays[_DOPPLER],
-        cn0_dbhz=arrays[_CN0],
-        lli=arrays[_LLI],
+        code_m=arrays[CODE],
+        carrier_m=arrays[CARRIER],
+        doppler_hz=arrays[DOPPLER],
+        cn0_dbhz=arrays[CN0],
+        lli=arrays[LLI],
         signals=chosen,
         simulated=simulated or any(comment.startswith(SIMULATED_LABEL) for comment in header.comments),
         notes=tuple(notes),
@@ -314,28 +306,13 @@ class _Epochs:
         )
 
 
-@dataclass(frozen=True, kw_only=True)
-class _FlatValues:
-    """Every wanted observation of a file, one row each; `code` indexes `codes`."""
-
-    codes: list[tuple[str, str]]  # (system, observation code)
-    epoch: IntArray
-    satellite: IntArray
-    code: IntArray
-    value: FloatArray
-    lli: FloatArray
-
-
-def _flat_values(parsed: Any, epochs: _Epochs, signals: SignalTable) -> _FlatValues:
-    wanted: dict[str, list[str]] = {"G": [], "E": []}
-    for (system, band), trackings in signals.items():
-        if system not in wanted or band not in BAND_INDEX:
-            raise ValueError(f"signals: {(system, band)!r} is not a system (G, E) and band ({', '.join(BANDS)})")
-        wanted[system] += [letter + tracking for tracking in trackings for letter in _QUANTITY_LETTERS]
-    codes = [(system, code) for system, names in wanted.items() for code in names]
+def _flat_values(parsed: Any, epochs: _Epochs, signals: SignalTable) -> FlatValues:
+    bands = wanted_codes(signals)
+    codes = list(bands)
+    unit = np.array([WAVELENGTH_M[BAND_INDEX[band]] if code[0] == "L" else 1.0 for (_, code), band in bands.items()])
     place = {key: index for index, key in enumerate(codes)}
-    systems: dict[str, Any] = {"G": sidereon.GnssSystem.GPS, "E": sidereon.GnssSystem.GALILEO}
-    allowed = sidereon.ObservationFilter([(systems[letter], names) for letter, names in wanted.items() if names])
+    wanted = {letter: [code for system, code in codes if system == letter] for letter in _SYSTEMS}
+    allowed = sidereon.ObservationFilter([(_SYSTEMS[letter], names) for letter, names in wanted.items() if names])
     columns: list[tuple[Any, ...]] = []
     for row, index in enumerate(epochs.indices):
         series = parsed.observation_values(index, allowed)
@@ -345,51 +322,10 @@ def _flat_values(parsed: Any, epochs: _Epochs, signals: SignalTable) -> _FlatVal
         columns.append((np.full(len(names), row), satellite, np.array(keys, dtype=np.int16), series.values, series.lli))
     epoch, satellites, code, value, lli = (np.concatenate(column) for column in zip(*columns, strict=True))
     keep = (satellites >= 0) & (code >= 0) & np.isfinite(value) & (value != 0.0)
-    return _FlatValues(
-        codes=codes, epoch=epoch[keep], satellite=satellites[keep], code=code[keep], value=value[keep], lli=lli[keep]
+    code, value = code[keep], value[keep]
+    return FlatValues(
+        codes=codes, epoch=epoch[keep], satellite=satellites[keep], code=code, value=value * unit[code], lli=lli[keep]
     )
-
-
-def _choose(counts: Mapping[str, int], trackings: Sequence[str]) -> SignalChoice | None:
-    """Choice for one system and band from the numbers of observations of each observation code."""
-    both = [min(counts.get("C" + tracking, 0), counts.get("L" + tracking, 0)) for tracking in trackings]
-    together = next((t for t, n in zip(trackings, both, strict=True) if n > 0 and 2 * n >= max(both)), None)
-
-    def first(letter: str, preferred: str | None) -> str | None:
-        order = [preferred, *trackings] if preferred else trackings
-        return next((letter + tracking for tracking in order if counts.get(letter + tracking)), None)
-
-    code, carrier = first("C", together), first("L", together)
-    if code is None and carrier is None:
-        return None
-    tracking = (carrier or code or "")[1:]
-    return SignalChoice(code=code, carrier=carrier, doppler=first("D", tracking), cn0=first("S", tracking))
-
-
-def _dense(
-    flat: _FlatValues, n_epochs: int, signals: SignalTable
-) -> tuple[dict[tuple[str, str], SignalChoice], list[FloatArray]]:
-    """Chosen signals and the five quantities (code, carrier, doppler, C/N0, LLI), each (E, N_BANDS, N_SATS)."""
-    number = dict(zip(flat.codes, np.bincount(flat.code, minlength=len(flat.codes)).tolist(), strict=True))
-    place = {key: index for index, key in enumerate(flat.codes)}
-    arrays = [np.full((n_epochs, N_BANDS, N_SATS), np.nan) for _ in range(5)]
-    chosen: dict[tuple[str, str], SignalChoice] = {}
-    for (system, band), trackings in signals.items():
-        choice = _choose({code: n for (letter, code), n in number.items() if letter == system}, trackings)
-        if choice is None:
-            continue
-        chosen[system, band] = choice
-        row = BAND_INDEX[band]
-        for quantity, name in enumerate((choice.code, choice.carrier, choice.doppler, choice.cn0)):
-            if name is None:
-                continue
-            rows = flat.code == place[system, name]
-            where = (flat.epoch[rows], row, flat.satellite[rows])
-            arrays[quantity][where] = flat.value[rows] * (WAVELENGTH_M[row] if quantity == _CARRIER else 1.0)
-            if quantity == _CARRIER:
-                arrays[_LLI][where] = np.nan_to_num(flat.lli[rows])  # a blank indicator is 0 (RINEX)
-    arrays[_CODE][arrays[_CODE] <= 0.0] = np.nan
-    return chosen, arrays
 
 
 def _set_loss_of_lock(lli: FloatArray, carrier_m: FloatArray, epochs: _Epochs) -> None:

@@ -3,27 +3,18 @@
 from __future__ import annotations
 
 import re
-import zlib
 from pathlib import Path
 from typing import Final
 
-PathLike = str | Path
+from gbas_core.files import GnssFileError, read_bytes
 
 _QUOTED_LINE: Final = re.compile(r' in "(.*)', re.DOTALL)
-_GZIP_MAGIC: Final = b"\x1f\x8b"
-_COMPRESS_MAGIC: Final = b"\x1f\x9d"
-
 
 SIMULATED_LABEL: Final = "SIMULATED DATA"
 
 
-class RinexError(ValueError):
-    """A RINEX file that cannot be used; the text names the file, the place, what is there and what was expected."""
-
-    def __init__(self, path: PathLike, problem: str) -> None:
-        super().__init__(f"{path}: {problem}")
-        self.path = Path(path)
-        self.problem = problem
+class RinexError(GnssFileError):
+    """A RINEX file that cannot be used."""
 
 
 def read_text(path: Path, notes: list[str]) -> str:
@@ -36,11 +27,7 @@ def read_text(path: Path, notes: list[str]) -> str:
     RinexError
         If the file cannot be read, is empty, or is compressed in a way that is not understood.
     """
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise RinexError(path, f"cannot be read: {error.strerror}") from error
-    data = _decompressed(path, data, notes)
+    data = read_bytes(path, notes, RinexError)
     if not data.strip():
         raise RinexError(path, "is empty; expected a RINEX file")
     text = re.sub(rb"[^\x00-\x7f]", b"?", data).decode("ascii").replace("\r\n", "\n")
@@ -48,24 +35,6 @@ def read_text(path: Path, notes: list[str]) -> str:
         notes.append("the last line has no end: it was taken for cut off and left out")
         text = text[: text.rfind("\n") + 1] or text
     return text
-
-
-def _decompressed(path: Path, data: bytes, notes: list[str]) -> bytes:
-    if data.startswith(_COMPRESS_MAGIC):
-        raise RinexError(path, "compressed with Unix compress (.Z); expected plain text or gzip")
-    if not data.startswith(_GZIP_MAGIC):
-        return data
-    text = bytearray()
-    while data.startswith(_GZIP_MAGIC):  # a gzip file may have several members
-        inflater = zlib.decompressobj(wbits=31)
-        try:
-            text += inflater.decompress(data) + inflater.flush()
-        except zlib.error as error:
-            raise RinexError(path, f"damaged gzip data after {len(text)} characters: {error}") from error
-        if not inflater.eof:
-            notes.append("the gzip data end early: the file was cut off")
-        data = inflater.unused_data
-    return bytes(text)
 
 
 def checked_version(path: Path, text: str, letter: str, expected: str) -> float:
