@@ -15,7 +15,7 @@ from gbas_core.signals import L1, SPEED_OF_LIGHT_MPS
 from gbas_ground.causes import ExclusionCause
 from gbas_ground.station import RESTART_AFTER_REFUSED, GroundEpoch, GroundStation
 from gbas_msgs_py.records import ChannelState
-from ground_runs import half_seconds, params, run
+from ground_runs import half_seconds, params, run, watching_monitors
 from synthetic_ranges import TOW_S, WEEK, constellation, truth
 
 MS_M = 1e-3 * SPEED_OF_LIGHT_MPS
@@ -233,7 +233,8 @@ def test_correction_limit(sign):
 def test_rate_limit():
     error = lambda second: np.where(np.arange(N_SATS) == SAT_INDEX["G02"], 5.0 * second, 0.0)  # noqa: E731
     # 5 m/s would be taken for a slip against the known range; here it is a rate both code and carrier have
-    out = run(truth(3), params(3, settle_time_s=0.0), half_seconds(20), code_error_m=error)
+    station = params(3, settle_time_s=0.0, monitors=watching_monitors())
+    out = run(truth(3), station, half_seconds(20), code_error_m=error)
     told = out.told("rrc_limit")
     assert told[0][1:] == ("exclusion", "G02")
     assert out.integrity[-1].cause[SAT_INDEX["G02"]] == ExclusionCause.RRC_LIMIT

@@ -30,6 +30,8 @@ class ExclusionCause(IntEnum):
     """The sigma does not fit in the message."""
     NO_RATE = 8
     """No previous epoch to form a range rate correction with."""
+    UNMONITORED = 9
+    """A required monitor cannot judge it, or not yet."""
     B_VALUE = 32
     """A B value above its threshold (multiple reference consistency check)."""
     RECEIVER_FAULT = 33

@@ -34,6 +34,7 @@ def conclude(
     measured: Measured,
     made: Corrections,
     exclusions: Exclusions,
+    judged: BoolArray,
     params: GroundParams,
 ) -> Condition:
     """Condition of every satellite; of several reasons against its use the first in the list below is told.
@@ -42,6 +43,8 @@ def conclude(
     ----------
     tracked : (R, N) bool array
         Channels with code and carrier.
+    judged : (N,) bool array
+        Satellites that every required monitor of signals could judge.
     """
     seen = tracked.any(axis=0)
     visible = measured.elevation_rad >= params.elevation_mask_rad
@@ -50,6 +53,7 @@ def conclude(
     settling = (usable & np.isfinite(tracks.age_s) & ~measured.settled).sum(axis=0)
     short = made.count < params.min_receivers
     waiting = short & (ready < params.min_receivers) & (ready + settling >= params.min_receivers)
+    unmonitored = waiting & ~judged & _has_settled(tracks, usable, params)
     channel_cause = _channel_cause(tracked, exclusions)
     no_rate = ~np.isfinite(made.prc_m + made.rrc_mps).all(axis=0)
 
@@ -60,6 +64,7 @@ def conclude(
         (np.isnan(measured.elevation_rad + known.crc), excluded, ExclusionCause.NO_EPHEMERIS),
         (~visible, excluded, ExclusionCause.BELOW_MASK),
         (exclusions.satellites.excluded, exclusions.satellites.state, exclusions.satellites.cause),
+        (unmonitored, ChannelState.SETTLING, ExclusionCause.UNMONITORED),
         (waiting, ChannelState.SETTLING, ExclusionCause.SETTLING),
         (short & (channel_cause >= float(FIRST_LATCHED)), excluded, channel_cause),
         (short & (ready >= params.min_receivers), excluded, ExclusionCause.TOO_FEW_COMMON_SATELLITES),
@@ -74,6 +79,12 @@ def conclude(
             state = np.where(mask, its_state, state)
             cause = np.where(mask, its_cause, cause)
     return Condition(state=state, cause=cause)
+
+
+def _has_settled(tracks: Tracks, usable: BoolArray, params: GroundParams) -> BoolArray:
+    """Satellites that enough smoothing filters have settled for, ``(N,)``."""
+    settled = usable & (tracks.age_s >= params.settle_time_s)
+    return np.asarray(settled.sum(axis=0) >= params.min_receivers)
 
 
 def _channel_cause(tracked: BoolArray, exclusions: Exclusions) -> FloatArray:

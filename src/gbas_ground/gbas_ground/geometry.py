@@ -27,32 +27,33 @@ class Site:
     ----------
     positions_m : (R + 1, 3) array
         Reference receivers and, last, the reference point, ECEF [m].
-    up : (3,) array
-        Unit vector up at the reference point, ECEF.
+    enu : (3, 3) array
+        Unit vectors east, north and up at the reference point, ECEF.
     """
 
     positions_m: FloatArray
-    up: FloatArray
+    enu: FloatArray
 
 
 def site_of(params: GroundParams) -> Site:
     """Positions of a station."""
     positions = np.concatenate([params.receiver_positions_m(), params.reference_point_m()[np.newaxis]])
-    return Site(positions_m=positions, up=rot_enu_ecef(params.latitude_rad, params.longitude_rad)[2])
+    return Site(positions_m=positions, enu=rot_enu_ecef(params.latitude_rad, params.longitude_rad))
 
 
 class Expected(NamedTuple):
-    """Expected ranges and clocks ``(R, N)`` [m], [s], and elevations at the reference point ``(N,)`` [rad]."""
+    """Expected ranges and clocks ``(R, N)`` [m], [s]; elevations and azimuths at the reference point ``(N,)`` [rad]."""
 
     range_m: FloatArray
     clock_s: FloatArray
     elevation_rad: FloatArray
+    azimuth_rad: FloatArray
 
 
 def expected(
     ephemeris: Ephemeris, gps_week: int, tow_s: float, code_m: FloatArray, site: Site, band: int = L1
 ) -> Expected:
-    """Geometric ranges with Earth rotation, satellite clocks and elevations.
+    """Geometric ranges with Earth rotation, satellite clocks, elevations and azimuths.
 
     Parameters
     ----------
@@ -69,5 +70,5 @@ def expected(
     own = np.concatenate([code_m, np.full((1, code_m.shape[-1]), np.nan)])
     state = transmit_place(ephemeris, gps_week, tow_s, np.where(np.isfinite(own), own, _MEAN_RANGE_M), band)
     range_m, los = rotated_range(site.positions_m, state.position_m)
-    up = los[-1, 0] * site.up[0] + los[-1, 1] * site.up[1] + los[-1, 2] * site.up[2]
-    return Expected(range_m[:-1], state.clock_s[:-1], np.arcsin(up))
+    east, north, up = (los[-1, 0] * axis[0] + los[-1, 1] * axis[1] + los[-1, 2] * axis[2] for axis in site.enu)
+    return Expected(range_m[:-1], state.clock_s[:-1], np.arcsin(up), np.arctan2(east, north))

@@ -15,16 +15,30 @@ from gbas_core.divergence import GROUND_SIGMA_MPS, GROUND_THRESHOLD_MPS, Diverge
 from gbas_core.signals import BAND_INDEX, BANDS
 from gbas_ground.declared import Declared, nested, parameter
 from gbas_ground.gradient_detectability import GRADIENT_RANGE, P_MISSED_DETECTION
+from gbas_ground.monitors.carrier_acceleration import STATISTICS, CarrierAccelerationParams
 from gbas_ground.monitors.carrier_noise import CarrierNoise
 from gbas_ground.monitors.code_carrier_divergence import CcdParams
+from gbas_ground.monitors.divergence_covariance import Matrix3, StatisticCovariance
 from gbas_ground.monitors.false_alarm import FALSE_EXCLUSION
 from gbas_ground.monitors.ionosphere_gradient import IonosphereGradientParams
+from gbas_ground.monitors.two_frequency_divergence import TwoFrequencyParams
 from gbas_msgs_py.parameters import ParameterError
 
 _DEGREE: Final = math.pi / 180.0
 _SETTLE_S: Final = 230.0
 """As the smoothing filters (docs/decisions/0002): both CCD filters have forgotten their start to 1 % after 207 s."""
 _PROBABILITY: Final = {"low": 1e-12, "high": 0.1}
+_TRIANGLE: Final = 6
+_UPPER: Final = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+
+
+def _triangle(matrix: Matrix3) -> tuple[float, ...]:
+    return tuple(matrix[row][column] for row, column in _UPPER)
+
+
+def _matrix(values: tuple[float, ...]) -> Matrix3:
+    a, b, c, d, e, f = values
+    return ((a, b, c), (b, d, e), (c, e, f))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,6 +58,102 @@ class CcdSection(Declared):
         """Parameters of the monitor."""
         filters = DivergenceParams(tau_s=self.tau_s, settle_s=self.settle_s, max_gap_s=max_gap_s)
         return CcdParams(filters=filters, threshold_mps=self.threshold_mps, sigma_mps=GROUND_SIGMA_MPS)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TwoFrequencySection(Declared):
+    """Code-carrier divergence on two bands (GAST-F)."""
+
+    exclude: str = parameter(
+        "ccd_f", "exclude", "sound", "-", "form whose failures are excluded", choices=("sound", "paper", "none")
+    )
+    other: str = parameter("ccd_f", "other_band", "L5", "-", "band beside L1", choices=("L2", "L5"))
+    p_false_alarm: float = parameter("ccd_f", "p_false_alarm", 1e-9, "-", "of a satellite and epoch", **_PROBABILITY)
+    min_clock_satellites: int = parameter(
+        "ccd_f", "min_clock_satellites", 3, "-", "others a receiver's clock is averaged from", low=1, high=35
+    )
+    zenith_delay_m: float = parameter(
+        "ccd_f", "zenith_delay_m", 2.4, "m", "troposphere removed from the carrier", low=0.0, high=5.0
+    )
+    receiver_covariance: tuple[float, ...] = parameter(
+        "ccd_f", "receiver_covariance", (0.0,) * 6, "(m/s)^2",
+        "of DF, DF other, IF carrier, upper triangle by rows: part of each receiver", low=-1.0, high=1.0,
+    )  # fmt: skip
+    common_covariance: tuple[float, ...] = parameter(
+        "ccd_f", "common_covariance", _triangle(StatisticCovariance().common), "(m/s)^2",
+        "likewise: part that the receivers share; the default is the published bound", low=-1.0, high=1.0,
+    )  # fmt: skip
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("receiver_covariance", "common_covariance"):
+            if len(getattr(self, name)) != _TRIANGLE:
+                raise ParameterError(f"ccd_f.{name} = {getattr(self, name)} is not {_TRIANGLE} numbers")
+        try:
+            self._covariance()
+        except ValueError as error:
+            raise ParameterError(f"ccd_f: {error}") from None
+
+    def params(self, filters: DivergenceParams) -> TwoFrequencyParams:
+        """Parameters of the monitor; its filters are those of the single-band one."""
+        return TwoFrequencyParams(
+            other=BAND_INDEX[self.other],
+            filters=filters,
+            p_false_alarm=self.p_false_alarm,
+            min_clock_satellites=self.min_clock_satellites,
+            zenith_delay_m=self.zenith_delay_m,
+            covariance=self._covariance(),
+        )
+
+    def _covariance(self) -> StatisticCovariance:
+        return StatisticCovariance(receiver=_matrix(self.receiver_covariance), common=_matrix(self.common_covariance))
+
+
+@dataclass(frozen=True, kw_only=True)
+class AccelerationSection(Declared):
+    """Step, rate and acceleration of the carriers."""
+
+    exclude: bool = parameter("acceleration", "exclude", True, "-", "satellites and channels that fail are excluded")
+    window_s: float = parameter("acceleration", "window_s", 5.0, "s", "oldest epoch in the fit", low=1.0, high=60.0)
+    points: int = parameter("acceleration", "points", 10, "-", "most epochs in the fit", low=4, high=120)
+    least_points: int = parameter("acceleration", "least_points", 5, "-", "fewest epochs in it", low=4, high=120)
+    min_satellites: int = parameter(
+        "acceleration", "min_satellites", 4, "-", "others a receiver's clock is taken from", low=2, high=35
+    )
+    common: tuple[float, float, float] = parameter(
+        "acceleration", "common", CarrierAccelerationParams.common, "m, m/s, m/s2",
+        "sigma of step, rate and acceleration that all receivers share", low=0.0, high=1.0,
+    )  # fmt: skip
+    natural: tuple[float, float, float] = parameter(
+        "acceleration", "natural", CarrierAccelerationParams.natural, "m, m/s, m/s2",
+        "largest step, rate and acceleration that are no fault", low=0.0, high=10.0,
+    )  # fmt: skip
+    p_false_alarm: float = parameter(
+        "acceleration", "p_false_alarm", FALSE_EXCLUSION, "-", "of one source in 15 s", **_PROBABILITY
+    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("common", "natural"):
+            if len(getattr(self, name)) != len(STATISTICS):
+                raise ParameterError(f"acceleration.{name} = {getattr(self, name)} is not {len(STATISTICS)} numbers")
+        if self.least_points > self.points:
+            raise ParameterError(
+                f"acceleration.least_points = {self.least_points} is more than acceleration.points = {self.points}"
+            )
+
+    def params(self, max_gap_s: float) -> CarrierAccelerationParams:
+        """Parameters of the monitor."""
+        return CarrierAccelerationParams(
+            points=self.points,
+            window_s=self.window_s,
+            least_points=self.least_points,
+            min_satellites=self.min_satellites,
+            max_gap_s=max_gap_s,
+            common=self.common,
+            natural=self.natural,
+            p_false_alarm=self.p_false_alarm,
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -134,4 +244,6 @@ class MonitorParams(Declared):
 
     carrier_noise: CarrierNoiseSection = nested(CarrierNoiseSection())
     ccd: CcdSection = nested(CcdSection())
+    ccd_f: TwoFrequencySection = nested(TwoFrequencySection())
+    acceleration: AccelerationSection = nested(AccelerationSection())
     gradient: GradientSection = nested(GradientSection())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -304,8 +305,10 @@ def _process(
     correction = range_correction_m(should.range_m, tracks.smoothed_m, should.clock_s)
     settled = _settled(tracks, correction, should, params)
     channel_ok = tracked & ~np.logical_or.reduce([check.failed for _, check in checks])
-    seen = _seen(clean, tracks, should, channel_ok, settled, known, new_exclusions, dt_s, params)
+    shift_m = _shift_m(state, epoch, should, changed, clean, site)
+    seen = _seen(clean, tracks, should, channel_ok, settled, known, new_exclusions, changed, shift_m, dt_s, params)
     watching, watched = watch(state.watching, seen, params)
+    new_exclusions = _exclude_channels(new_exclusions, watched.channels, events)
     new_exclusions, noticed = _exclude_satellites(new_exclusions, watched)
     measured = Measured(
         correction_m=correction,
@@ -320,10 +323,10 @@ def _process(
     findings = (*noticed, *findings)
     events.found(findings)
     new_exclusions = _advanced(
-        new_exclusions, measured, made, channel_ok, watched.passed & watched.ready, dt_s, params
+        new_exclusions, measured, made, channel_ok, watched.passed, dt_s, params
     )
 
-    condition = conclude(tracked, tracks, known, measured, made, new_exclusions, params)
+    condition = conclude(tracked, tracks, known, measured, made, new_exclusions, watched.ready, params)
     integrity = integrity_of(epoch.gps_week, epoch.tow_s, known, measured, made, condition)
     channels = channel_epoch(
         epoch.gps_week, epoch.tow_s, tracked, tracks, measured, made, condition, new_exclusions, state.channels
@@ -416,7 +419,7 @@ def _released(exclusions: Exclusions, params: GroundParams, events: EventLog) ->
     return Exclusions(channels=channels, receivers=receivers, satellites=satellites)
 
 
-_Checks = tuple[tuple[ExclusionCause, MonitorResult], ...]
+_Checks = Sequence[tuple[ExclusionCause, MonitorResult]]
 
 
 def _channel_checks(raw: RawEpoch, should: Expected, tracked: BoolArray, params: GroundParams) -> _Checks:
@@ -466,6 +469,8 @@ def _seen(
     settled: BoolArray,
     known: EphemerisState,
     exclusions: Exclusions,
+    changed: BoolArray,
+    shift_m: FloatArray,
     dt_s: float,
     params: GroundParams,
 ) -> Seen:
@@ -481,15 +486,28 @@ def _seen(
         due=due,
         may_refer=due & ~exclusions.satellites.excluded,
         expected=should,
+        rebased=changed,
+        shift_m=shift_m,
         dt_s=dt_s,
     )
+
+
+def _shift_m(
+    state: MonitorState, epoch: GroundEpoch, should: Expected, changed: BoolArray, raw: RawEpoch, site: Site
+) -> FloatArray:
+    """What another ephemeris than that of the epoch before adds to a carrier's residual, ``(R, N)`` [m]."""
+    if not changed.any():
+        return np.zeros_like(should.range_m)
+    old = expected(state.ephemerides.current, epoch.gps_week, epoch.tow_s, raw.code_m[:, L1], site)
+    shift_m = old.range_m - should.range_m - SPEED_OF_LIGHT_MPS * (old.clock_s - should.clock_s)
+    return np.where(changed, shift_m, 0.0)
 
 
 def _exclude_satellites(exclusions: Exclusions, watched: Watched) -> tuple[Exclusions, tuple[Finding, ...]]:
     """Exclude the satellites that monitors of signals fail; several may fail one, and each says so."""
     satellites, findings = exclusions.satellites, []
-    for cause, result, excludes in watched.verdicts:
-        if not excludes or not result.failed.any():
+    for cause, result in watched.satellites:
+        if not result.failed.any():
             continue
         for satellite in np.flatnonzero(result.failed & ~exclusions.satellites.excluded):
             value, threshold = result.at(int(satellite))

@@ -10,19 +10,28 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gbas_core.divergence import DivergenceState
 from gbas_core.record import FloatArray
 from gbas_core.satellites import missing
-from gbas_core.signals import L1, L5
+from gbas_core.signals import L1, L5, N_BANDS
 from gbas_ground.causes import ExclusionCause
 from gbas_ground.corrections import BoolArray
 from gbas_ground.geometry import Expected
 from gbas_ground.looks import Look, look
-from gbas_ground.monitors.code_carrier_divergence import CcdEpoch, CcdParams, ccd_step, initial_ccd
+from gbas_ground.monitors.carrier_acceleration import (
+    CarrierAccelerationParams,
+    CarrierAccelerationResult,
+    CarrierAccelerationState,
+    carrier_acceleration_step,
+    initial_carrier_acceleration,
+)
+from gbas_ground.monitors.code_carrier_divergence import CcdParams, ccd_step, initial_ccd
+from gbas_ground.monitors.divergence_classification import MODES, NO_FAULT, classify
 from gbas_ground.monitors.double_difference import (
     DoubleDifferences,
     Troposphere,
@@ -38,8 +47,23 @@ from gbas_ground.monitors.ionosphere_gradient import (
     gradient_site,
 )
 from gbas_ground.monitors.result import MonitorResult
+from gbas_ground.monitors.two_frequency_divergence import (
+    TwoFrequencyEpoch,
+    TwoFrequencyInput,
+    TwoFrequencyParams,
+    TwoFrequencyState,
+    initial_two_frequency,
+    two_frequency_step,
+)
 from gbas_ground.params import GroundParams
 from gbas_msgs_py.records import BASELINES, MAX_REFERENCE_RECEIVERS
+
+_CARRIER_CAUSES: Final = (
+    ("carrier_step", ExclusionCause.CARRIER_STEP),
+    ("carrier_rate", ExclusionCause.CARRIER_RATE),
+    ("acceleration", ExclusionCause.CARRIER_ACCELERATION),
+)
+"""Names and causes in the order of the acceleration monitor's statistics."""
 
 
 class Seen(NamedTuple):
@@ -58,6 +82,10 @@ class Seen(NamedTuple):
     may_refer : (N,) bool array
         Satellites others may be compared with.
     expected : Expected
+    rebased : (N,) bool array
+        Satellites whose ephemeris is another than at the epoch before.
+    shift_m : (R, N) array
+        What another ephemeris adds to a carrier less what is expected of it [m].
     dt_s : float
         Time since the epoch before; NaN at the first [s].
     """
@@ -70,6 +98,8 @@ class Seen(NamedTuple):
     due: BoolArray
     may_refer: BoolArray
     expected: Expected
+    rebased: BoolArray
+    shift_m: FloatArray
     dt_s: float
 
 
@@ -78,42 +108,72 @@ class WatchState:
     """What the monitors remember between epochs."""
 
     ccd: DivergenceState
+    ccd_f: TwoFrequencyState
+    acceleration: CarrierAccelerationState
 
 
 class Verdict(NamedTuple):
-    """What one monitor decided about satellites, ``(N,)``; `excludes` says whether that counts."""
+    """What one monitor decided about satellites ``(N,)`` or channels ``(R, N)``, where that counts."""
 
     cause: ExclusionCause
     result: MonitorResult
-    excludes: bool
+
+
+class _Part(NamedTuple):
+    """What one monitor has to say.
+
+    Attributes
+    ----------
+    looks : mapping from a monitor's name to Look
+    details : mapping from a field of :class:`MonitorEpoch` to its value
+    satellites, channels : tuple of Verdict
+        What follows from it; nothing from a monitor that is only watched.
+    ready : (N,) bool array or None
+        Satellites it could judge, where that is required.
+    """
+
+    looks: Mapping[str, Look]
+    details: Mapping[str, Any] = {}
+    satellites: tuple[Verdict, ...] = ()
+    channels: tuple[Verdict, ...] = ()
+    ready: BoolArray | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Watched:
-    """What the monitors found at one epoch.
+    """What all monitors found at one epoch.
 
     Attributes
     ----------
-    verdicts : tuple of Verdict
-    looks : mapping from a monitor's name to Look
+    satellites, channels : tuple of Verdict
+        What has to be excluded, and why.
     ready : (N,) bool array
         Satellites that every required monitor could judge.
-    passed : (N,) bool array
-        Those that none of the monitors that exclude failed.
+    looks : mapping from a monitor's name to Look
     details : mapping from a field of :class:`MonitorEpoch` to its value
     """
 
-    verdicts: tuple[Verdict, ...]
-    looks: Mapping[str, Look]
+    satellites: tuple[Verdict, ...]
+    channels: tuple[Verdict, ...]
     ready: BoolArray
-    passed: BoolArray
+    looks: Mapping[str, Look]
     details: Mapping[str, Any]
+
+    @property
+    def passed(self) -> BoolArray:
+        """Satellites that were judged and not failed, ``(N,)``."""
+        passed = self.ready
+        for verdict in self.satellites:
+            passed = passed & ~verdict.result.failed
+        return passed
 
 
 class _Settings(NamedTuple):
     """Parameters and constants of the monitors; made once from the station's parameters."""
 
     ccd: CcdParams
+    ccd_f: TwoFrequencyParams
+    acceleration: CarrierAccelerationParams
     gradient: IonosphereGradientParams
     gradient_required: bool
     site: GradientSite
@@ -123,12 +183,13 @@ class _Settings(NamedTuple):
 @lru_cache(maxsize=8)
 def _settings(params: GroundParams) -> _Settings:
     sections = params.monitors
-    gradient = sections.gradient.params(
-        tuple(approach.course_rad for approach in params.approaches),
-        sections.carrier_noise.params(),
-    )
+    courses = tuple(approach.course_rad for approach in params.approaches)
+    gradient = sections.gradient.params(courses, sections.carrier_noise.params())
+    ccd = sections.ccd.params(params.max_gap_s)
     return _Settings(
-        ccd=sections.ccd.params(params.max_gap_s),
+        ccd=ccd,
+        ccd_f=sections.ccd_f.params(ccd.filters),
+        acceleration=sections.acceleration.params(params.max_gap_s),
         gradient=gradient,
         gradient_required=sections.gradient.required or params.gast_d,
         site=gradient_site(params.receiver_positions_m(), params.reference_point_m(), gradient),
@@ -138,85 +199,190 @@ def _settings(params: GroundParams) -> _Settings:
 
 def initial_watch(params: GroundParams) -> WatchState:
     """Monitors that have seen nothing."""
-    return WatchState(ccd=initial_ccd(_settings(params).ccd, params.n_receivers))
+    settings, count = _settings(params), params.n_receivers
+    return WatchState(
+        ccd=initial_ccd(settings.ccd, count),
+        ccd_f=initial_two_frequency(settings.ccd_f, count),
+        acceleration=initial_carrier_acceleration(count, settings.acceleration),
+    )
 
 
 def watch(state: WatchState, seen: Seen, params: GroundParams) -> tuple[WatchState, Watched]:
     """Run every monitor over one epoch."""
     settings, sections = _settings(params), params.monitors
-    ccd_state, ccd = ccd_step(
-        state.ccd, seen.code_m, seen.carrier_m, seen.slipped, seen.ready, seen.dt_s, settings.ccd
+    residual_m = _residual_m(seen, settings)
+    ccd, divergence = _ccd(state.ccd, seen, settings, exclude=sections.ccd.exclude)
+    ccd_f, two_frequency = _ccd_f(state.ccd_f, seen, settings, sections.ccd_f.exclude)
+    acceleration, carrier = _acceleration(
+        state.acceleration, residual_m, seen, settings, exclude=sections.acceleration.exclude
     )
-    differences, gradient = _gradient(seen, settings)
-    divergence = _of_band(ccd.satellites, L1)
-    verdicts = (
-        Verdict(ExclusionCause.CODE_CARRIER_DIVERGENCE, _on(divergence, seen.due), sections.ccd.exclude),
-        Verdict(ExclusionCause.IONOSPHERE_GRADIENT, _on(gradient.verdict, seen.due), sections.gradient.exclude),
-    )
-    looks = {
-        "ccd": look(divergence, seen.due),
-        "gradient": look(gradient.verdict, seen.due & (len(settings.site.baselines) > 0)),
-    }
-    ready = ~sections.ccd.exclude | (ccd.receivers[L1] > 0)
-    if settings.gradient_required:
-        ready = ready & gradient.monitored
-    failed = [each.result.failed for each in verdicts if each.excludes]
+    gradient = _gradient(residual_m, seen, settings, exclude=sections.gradient.exclude)
+    parts = (divergence, two_frequency, carrier, gradient)
+    ready = np.ones_like(seen.due)
+    for part in parts:
+        if part.ready is not None:
+            ready = ready & part.ready
     watched = Watched(
-        verdicts=verdicts,
-        looks=looks,
-        ready=np.broadcast_to(ready, seen.due.shape),
-        passed=~np.logical_or.reduce(failed) if failed else np.ones_like(seen.due),
-        details=_details(ccd, differences, gradient, settings),
+        satellites=tuple(verdict for part in parts for verdict in part.satellites),
+        channels=tuple(verdict for part in parts for verdict in part.channels),
+        ready=ready,
+        looks={name: each for part in parts for name, each in part.looks.items()},
+        details={name: each for part in parts for name, each in part.details.items()},
     )
-    return WatchState(ccd=ccd_state), watched
+    return WatchState(ccd=ccd, ccd_f=ccd_f, acceleration=acceleration), watched
 
 
-def _on(result: MonitorResult, satellites: BoolArray) -> MonitorResult:
-    """Failures of these satellites alone."""
-    return replace(result, failed=result.failed & satellites)
-
-
-def _of_band(result: MonitorResult, band: int) -> MonitorResult:
-    return MonitorResult(
-        statistic=result.statistic[band],
-        threshold=np.broadcast_to(result.threshold, result.statistic.shape)[band],
-        failed=result.failed[band],
-    )
-
-
-def _gradient(seen: Seen, settings: _Settings) -> tuple[DoubleDifferences, GradientResult]:
-    site, params = settings.site, settings.gradient
-    residual_m = carrier_residual_m(
-        np.where(seen.ready[:, np.newaxis], seen.carrier_m, np.nan),
-        seen.expected.range_m,
-        seen.expected.clock_s,
-        seen.expected.elevation_rad,
-        site.baselines.height_m,
-        settings.troposphere,
-        params.bands,
-    )
-    references = reference_satellites(seen.may_refer, seen.expected.elevation_rad, params.references)
-    differences = double_differences(
-        residual_m, site.baselines, references, seen.expected.elevation_rad, params.noise, params.bands
-    )
-    return differences, check_ionosphere_gradient(differences, seen.due, site, params)
-
-
-def _details(
-    ccd: CcdEpoch, differences: DoubleDifferences, gradient: GradientResult, settings: _Settings
-) -> dict[str, Any]:
+def _ccd(state: DivergenceState, seen: Seen, settings: _Settings, *, exclude: bool) -> tuple[DivergenceState, _Part]:
+    state, epoch = ccd_step(state, seen.code_m, seen.carrier_m, seen.slipped, seen.ready, seen.dt_s, settings.ccd)
+    result = _row(epoch.satellites, L1)
     by_receiver = missing(MAX_REFERENCE_RECEIVERS)
-    by_receiver[: len(ccd.receiver_mps)] = ccd.receiver_mps[:, L1]
-    details: dict[str, Any] = {
-        "ccd_receiver_mps": by_receiver,
-        "gradient": gradient.gradient,
-        "gradient_coverage": gradient.coverage,
-    }
+    by_receiver[: len(epoch.receiver_mps)] = epoch.receiver_mps[:, L1]
+    return state, _Part(
+        looks={"ccd": look(result, seen.due)},
+        details={"ccd_receiver_mps": by_receiver},
+        satellites=_verdicts(exclude, (ExclusionCause.CODE_CARRIER_DIVERGENCE, result), seen.due),
+        ready=epoch.receivers[L1] > 0 if exclude else None,
+    )
+
+
+def _ccd_f(state: TwoFrequencyState, seen: Seen, settings: _Settings, exclude: str) -> tuple[TwoFrequencyState, _Part]:
+    """Where a satellite has no second band there is nothing to judge: the single-band monitor has it."""
+    params = settings.ccd_f
+    given = TwoFrequencyInput(
+        code_m=seen.code_m,
+        carrier_m=seen.carrier_m,
+        restarted=seen.slipped,
+        range_m=seen.expected.range_m,
+        clock_s=seen.expected.clock_s,
+        rebased=seen.rebased,
+        elevation_rad=seen.expected.elevation_rad,
+        used=seen.ready,
+        clock_used=seen.ready & seen.may_refer,
+    )
+    state, epoch = two_frequency_step(state, given, seen.dt_s, params)
+    forms = {"sound": epoch.sound, "paper": epoch.paper}
+    due = seen.due & (epoch.receivers > 0)
+    chosen = forms.get(exclude)
+    return state, _Part(
+        looks={"ccd_f": look(epoch.sound, due), "ccd_f_paper": look(epoch.paper, due)},
+        details={"divergence_mps": epoch.mean_mps, **_likeliest_mode(epoch, due, params)},
+        satellites=() if chosen is None else _verdicts(True, (ExclusionCause.TWO_FREQUENCY_DIVERGENCE, chosen), due),
+    )
+
+
+def _likeliest_mode(epoch: TwoFrequencyEpoch, due: BoolArray, params: TwoFrequencyParams) -> dict[str, FloatArray]:
+    """Mode and its probability of the satellites that fail; missing for the rest."""
+    failed = due & epoch.sound.failed & np.isfinite(epoch.sound.statistic)
+    if not failed.any():
+        return {}
+    found = classify(epoch.mean_mps[[0, 1, 3]][:, failed], epoch.covariance[failed], params.band, params.other)
+    mode, probability = missing(), missing()
+    number = found.posterior.argmax(axis=0)
+    mode[failed] = np.where(number == MODES.index(NO_FAULT), 0, number + 1)
+    probability[failed] = found.posterior.max(axis=0)
+    return {"ccd_f_mode": mode, "ccd_f_mode_probability": probability}
+
+
+def _acceleration(
+    state: CarrierAccelerationState, residual_m: FloatArray, seen: Seen, settings: _Settings, *, exclude: bool
+) -> tuple[CarrierAccelerationState, _Part]:
+    params = settings.acceleration
+    state, found = carrier_acceleration_step(
+        state,
+        residual_m[:, list(params.bands)],
+        seen.slipped[:, list(params.bands)],
+        seen.ready & seen.due,
+        seen.expected.elevation_rad,
+        seen.dt_s,
+        params,
+        shift_m=seen.shift_m,
+    )
+    known = np.isfinite(found.satellites.statistic[0, 0])
+    each = [_row(found.satellites, number) for number in range(len(_CARRIER_CAUSES))]
+    looks = {name: look(result, seen.due) for (name, _), result in zip(_CARRIER_CAUSES, each, strict=True)}
+    number, worst = _worst(found.satellites)
+    cause = np.array([cause for _, cause in _CARRIER_CAUSES])[number]
+    failed = seen.due & known & found.failed_satellites
+    satellites = tuple(Verdict(name, replace(worst, failed=failed & (cause == name))) for _, name in _CARRIER_CAUSES)
+    channels = (Verdict(ExclusionCause.CARRIER_ACCELERATION, _channels(found)),)
+    return state, _Part(
+        looks=looks,
+        satellites=satellites if exclude else (),
+        channels=channels if exclude else (),
+        ready=known if exclude else None,
+    )
+
+
+def _channels(found: CarrierAccelerationResult) -> MonitorResult:
+    """The worst statistic of each channel, ``(R, N)``; one that is missing makes nobody fail, but is not ready."""
+    by_channel = MonitorResult(
+        statistic=np.moveaxis(found.channels.statistic, 1, 2).reshape(-1, *found.failed_channels.shape),
+        threshold=np.moveaxis(np.broadcast_to(found.channels.threshold, found.channels.statistic.shape), 1, 2).reshape(
+            -1, *found.failed_channels.shape
+        ),
+        failed=found.failed_channels,
+    )
+    _, worst = _worst(by_channel, axes=1)
+    return replace(worst, failed=found.failed_channels & (worst.statistic > worst.threshold))
+
+
+def _gradient(residual_m: FloatArray, seen: Seen, settings: _Settings, *, exclude: bool) -> _Part:
+    site, params = settings.site, settings.gradient
+    references = reference_satellites(seen.may_refer, seen.expected.elevation_rad, params.references)
+    used_m = np.where(seen.ready[:, np.newaxis], residual_m[:, list(params.bands)], np.nan)
+    differences = double_differences(
+        used_m, site.baselines, references, seen.expected.elevation_rad, params.noise, params.bands
+    )
+    found = check_ionosphere_gradient(differences, seen.due, site, params)
+    due = seen.due & (len(site.baselines) > 0)
+    return _Part(
+        looks={"gradient": look(found.verdict, due)},
+        details=_gradient_details(found, differences, settings),
+        satellites=_verdicts(exclude, (ExclusionCause.IONOSPHERE_GRADIENT, found.verdict), due),
+        ready=found.monitored if settings.gradient_required else None,
+    )
+
+
+def _gradient_details(found: GradientResult, differences: DoubleDifferences, settings: _Settings) -> dict[str, Any]:
+    details = {"gradient": found.gradient, "gradient_coverage": found.coverage}
     baselines, bands = settings.site.baselines, settings.gradient.bands
     places = [BASELINES.index((i + 1, j + 1)) for i, j in zip(baselines.first, baselines.second, strict=True)]
     for name, band in (("double_difference_m", L1), ("double_difference_l5_m", L5)):
-        values = missing(len(BASELINES))
         if band in bands:
-            values[places] = differences.residual_m[:, bands.index(band)]
-        details[name] = values
+            details[name] = missing(len(BASELINES))
+            details[name][places] = differences.residual_m[:, bands.index(band)]
     return details
+
+
+def _residual_m(seen: Seen, settings: _Settings) -> FloatArray:
+    """Carriers of all bands without what is expected of them, ``(R, N_BANDS, N)``."""
+    should = seen.expected
+    delay_m = settings.troposphere.delay_m(should.elevation_rad, should.azimuth_rad, settings.site.baselines.place_m)
+    return carrier_residual_m(seen.carrier_m, should.range_m, should.clock_s, delay_m, tuple(range(N_BANDS)))
+
+
+def _verdicts(exclude: bool, verdict: tuple[ExclusionCause, MonitorResult], due: BoolArray) -> tuple[Verdict, ...]:
+    """The failures of satellites that are due, unless the monitor is only watched."""
+    cause, result = verdict
+    return (Verdict(cause, replace(result, failed=result.failed & due)),) if exclude else ()
+
+
+def _row(result: MonitorResult, row: int) -> MonitorResult:
+    """One row of a result's first axis."""
+    threshold = np.broadcast_to(result.threshold, result.statistic.shape)
+    return MonitorResult(statistic=result.statistic[row], threshold=threshold[row], failed=result.failed[row])
+
+
+def _worst(result: MonitorResult, *, axes: int = 2) -> tuple[NDArray[np.int64], MonitorResult]:
+    """Of the first `axes` axes: place on the first of the statistic furthest over its threshold, and that statistic."""
+    shape = result.statistic.shape
+    statistic = result.statistic.reshape(-1, *shape[axes:])
+    threshold = np.broadcast_to(result.threshold, shape).reshape(-1, *shape[axes:])
+    ratio = statistic / threshold
+    place = np.where(np.isnan(ratio), -1.0, ratio).argmax(axis=0)
+    chosen = MonitorResult(
+        statistic=np.take_along_axis(statistic, place[np.newaxis], axis=0)[0],
+        threshold=np.take_along_axis(threshold, place[np.newaxis], axis=0)[0],
+        failed=np.zeros(shape[axes:], dtype=bool),
+    )
+    return place // int(np.prod(shape[1:axes], initial=1)), chosen
