@@ -46,14 +46,7 @@ def params(receivers: int = 4, **changes: Any) -> GroundParams:
         "settle_time_s": 5.0,
         "readmission_time_s": 10.0,
     }
-    chosen |= changes
-    chosen.setdefault("monitors", quick_monitors(chosen["settle_time_s"]))
-    return GroundParams(**chosen)
-
-
-def quick_monitors(settle_s: float) -> MonitorParams:
-    """Monitors that count as soon as the smoothing filters do."""
-    return MonitorParams(ccd=CcdSection(settle_s=settle_s))
+    return GroundParams(**(chosen | changes))
 
 
 def watching_monitors() -> MonitorParams:

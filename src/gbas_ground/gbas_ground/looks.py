@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -12,6 +12,8 @@ from gbas_core.satellites import N_SATS, missing
 from gbas_ground.corrections import BoolArray
 from gbas_ground.monitors.result import MonitorResult
 from gbas_msgs_py.records import GROUND_MONITORS, MonitorEpoch, MonitorState
+
+_EACH: Final = np.arange(N_SATS)
 
 
 class Look(NamedTuple):
@@ -37,21 +39,22 @@ def look(result: MonitorResult, due: BoolArray) -> Look:
     Look
         Statistic and threshold are those of the test that is furthest over its threshold, or nearest to it.
     """
-    shape = result.statistic.shape
-    count = max(1, int(np.prod(shape[:-1])))
-    statistic = result.statistic.reshape(count, N_SATS)
-    threshold = np.broadcast_to(result.threshold, shape).reshape(count, N_SATS)
-    failed = result.failed.reshape(count, N_SATS).any(axis=0)
-    expected = np.broadcast_to(due, shape).reshape(count, N_SATS).any(axis=0)
-    excess = (statistic - threshold) / np.abs(threshold)
-    known = np.isfinite(excess)
-    worst = np.where(known, excess, -np.inf).argmax(axis=0)[np.newaxis]
-    looked = known.any(axis=0)
+    threshold = np.broadcast_to(result.threshold, result.statistic.shape)
+    statistic, failed, expected = result.statistic, result.failed, due
+    if statistic.ndim > 1:
+        statistic, threshold = statistic.reshape(-1, N_SATS), threshold.reshape(-1, N_SATS)
+        excess = (statistic - threshold) / np.abs(threshold)
+        worst = np.where(np.isnan(excess), -np.inf, excess).argmax(axis=0)
+        statistic, threshold = statistic[worst, _EACH], threshold[worst, _EACH]
+        failed = np.logical_or.reduce(failed.reshape(-1, N_SATS))
+    if due.ndim > 1:
+        expected = np.logical_or.reduce(due.reshape(-1, N_SATS))
+    looked = np.isfinite(statistic + threshold)
     seen = np.where(looked, float(MonitorState.PASSED), float(MonitorState.NOT_MONITORED))
     state = np.where(expected, seen, float(MonitorState.NOT_DUE))
     return Look(
-        statistic=np.where(looked, np.take_along_axis(statistic, worst, axis=0)[0], np.nan),
-        threshold=np.where(looked, np.take_along_axis(threshold, worst, axis=0)[0], np.nan),
+        statistic=np.where(looked, statistic, np.nan),
+        threshold=np.where(looked, threshold, np.nan),
         state=np.where(failed, float(MonitorState.FAILED), state),
     )
 

@@ -25,8 +25,6 @@ from gbas_ground.monitors.two_frequency_divergence import TwoFrequencyParams
 from gbas_msgs_py.parameters import ParameterError
 
 _DEGREE: Final = math.pi / 180.0
-_SETTLE_S: Final = 230.0
-"""As the smoothing filters (docs/decisions/0002): both CCD filters have forgotten their start to 1 % after 207 s."""
 _PROBABILITY: Final = {"low": 1e-12, "high": 0.1}
 _TRIANGLE: Final = 6
 _UPPER: Final = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
@@ -48,15 +46,21 @@ class CcdSection(Declared):
     exclude: bool = parameter("ccd", "exclude", True, "-", "satellites that fail are excluded")
     tau_s: float = parameter("ccd", "tau_s", 30.0, "s", "time constant of both filters", low=1.0, high=1000.0)
     settle_s: float = parameter(
-        "ccd", "settle_s", _SETTLE_S, "s", "time a filter has to run before it counts", low=0.0, high=3600.0
-    )
+        "ccd", "settle_s", 0.0, "s", "time a filter has to run, where that is more than smoothing.settle_time_s",
+        low=0.0, high=3600.0,
+    )  # fmt: skip
     threshold_mps: float = parameter(
         "ccd", "threshold_mps", GROUND_THRESHOLD_MPS, "m/s", "of the mean over receivers", low=1e-4, high=10.0
     )
 
-    def params(self, max_gap_s: float) -> CcdParams:
-        """Parameters of the monitor."""
-        filters = DivergenceParams(tau_s=self.tau_s, settle_s=self.settle_s, max_gap_s=max_gap_s)
+    def params(self, smoothing_settle_s: float, max_gap_s: float) -> CcdParams:
+        """Parameters of the monitor.
+
+        The filters settle with those of the smoothing: after 207 s both have forgotten their start to 1 %
+        (:mod:`gbas_core.divergence`), less than the 230 s of docs/decisions/0002.
+        """
+        settle_s = max(self.settle_s, smoothing_settle_s)
+        filters = DivergenceParams(tau_s=self.tau_s, settle_s=settle_s, max_gap_s=max_gap_s)
         return CcdParams(filters=filters, threshold_mps=self.threshold_mps, sigma_mps=GROUND_SIGMA_MPS)
 
 

@@ -185,7 +185,7 @@ def _settings(params: GroundParams) -> _Settings:
     sections = params.monitors
     courses = tuple(approach.course_rad for approach in params.approaches)
     gradient = sections.gradient.params(courses, sections.carrier_noise.params())
-    ccd = sections.ccd.params(params.max_gap_s)
+    ccd = sections.ccd.params(params.settle_time_s, params.max_gap_s)
     return _Settings(
         ccd=ccd,
         ccd_f=sections.ccd_f.params(ccd.filters),

@@ -7,8 +7,8 @@ part of a run, in which the filters settle, is made once; each fault goes on fro
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from gbas_ground.params import GroundParams
 from gbas_ground.station import GroundEpoch, GroundStation, Monitored, StationState, initial_state
 from gbas_msgs_py.events import Event, EventKind
 from gbas_msgs_py.joining import ReceptionQueue
+from gbas_msgs_py.records import GROUND_MONITORS, MonitorState
 from gbas_msgs_py.vdb.burst import SLOT_DURATION_S, Burst
 from gbas_msgs_py.vdb.messages import Type1, Type11
 from gbas_msgs_py.vdb.receive import decode_burst
@@ -72,6 +73,8 @@ class Reaction:
         Word of the first exclusion, or ``""``.
     value, threshold : float
         Of that event.
+    failed_s : mapping from a monitor's name to float
+        First epoch at which each monitor failed the satellite, whether or not that excludes it.
     others : tuple of str
         Other subjects excluded within the run: false exclusions of satellites that have no fault.
     """
@@ -81,6 +84,7 @@ class Reaction:
     cause: str
     value: float
     threshold: float
+    failed_s: Mapping[str, float] = field(default_factory=dict)
     others: tuple[str, ...] = ()
 
     @property
@@ -135,17 +139,21 @@ def inject(settled: Settled, threats: tuple[Threat, ...], subject: str, onset_s:
     stop = min(len(settled.world), settled.number + math.ceil((onset_s - settled.time_s + watch_s) / interval_s) + 1)
     world = with_threats(settled.world, threats)
     events: list[tuple[float, Event]] = []
+    failed_s: dict[str, float] = {}
     burst_s = math.nan
     for number, (_, monitored, bursts) in enumerate(
         _steps(world, settled.params, settled.state, range(settled.number, stop)), start=settled.number
     ):
         since_s = number * interval_s - onset_s
         events += [(since_s, event) for event in monitored.events if event.kind == EventKind.EXCLUSION]
+        if since_s >= 0.0 and subject in SAT_INDEX:
+            for name in _failing(monitored, subject):
+                failed_s.setdefault(name, since_s)
         if math.isnan(burst_s) and since_s >= 0.0 and subject in SAT_INDEX and not _sent_as_valid(bursts, subject):
             burst_s = since_s + _end_of_slots_s(bursts)
         if math.isfinite(burst_s):
             break
-    return _reaction(events, subject, burst_s)
+    return replace(_reaction(events, subject, burst_s), failed_s=failed_s)
 
 
 def with_threats(world: World, threats: tuple[Threat, ...]) -> World:
@@ -176,6 +184,12 @@ def _steps(
 def _usable(monitored: Monitored) -> Iterator[str]:
     used = np.isfinite(monitored.integrity.prc_100_m)
     return (name for name, index in SAT_INDEX.items() if used[index])
+
+
+def _failing(monitored: Monitored, satellite: str) -> Iterator[str]:
+    """Monitors that fail a satellite."""
+    states = monitored.statistics.state[:, SAT_INDEX[satellite]]
+    return (name for name, state in zip(GROUND_MONITORS, states, strict=True) if state == MonitorState.FAILED)
 
 
 def _sent_as_valid(bursts: tuple[Burst, ...], satellite: str) -> bool:
