@@ -15,7 +15,7 @@ from typing import Annotated, Any
 
 import typer
 
-from gbas_bringup import __version__, cli_reproduce
+from gbas_bringup import __version__, cli_reproduce, cli_study
 from gbas_bringup.cli_base import (
     GbasGroup,
     Json,
@@ -48,6 +48,7 @@ app.add_typer(bag_app, name="bag")
 app.add_typer(sim_app, name="sim")
 app.add_typer(vdb_app, name="vdb")
 cli_reproduce.register(app)
+cli_study.register(app)
 
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Show every line the nodes write.")]
 Speed = Annotated[str, typer.Option("--speed", help="'max', or a multiple of real time.", metavar="max|N")]
@@ -294,7 +295,7 @@ def process(
 def bench(
     part: Annotated[
         list[str] | None,
-        typer.Option(help="Only this: steps, simulator, offline, process, latency, replay or files; may be repeated."),
+        typer.Option(help="One of steps, simulator, offline, process, latency, replay, files, ccd; may be repeated."),
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Short runs: less exact.")] = False,
     seconds: Annotated[float | None, typer.Option(help="Duration of the latency run (default: 40).")] = None,
