@@ -17,7 +17,7 @@ from gbas_core.gpstime import epoch_key, from_epoch_key
 from gbas_core.record import FloatArray
 from gbas_core.recording import RecordedEpoch, Recording
 from gbas_core.satellites import N_SATS, satellites_of
-from gbas_core.signals import L1, L2, L5, N_BANDS
+from gbas_core.signals import BANDS, L1, L2, L5, N_BANDS, SPEED_OF_LIGHT_MPS
 from gbas_core.slips import SlipParams, initial_slips, slip_step
 from gbas_ground import ephemerides as station_ephemerides
 from gbas_ground.corrections import BoolArray
@@ -178,7 +178,7 @@ class MonitoredSeries:
 
     def metric(self, covariance: StatisticCovariance) -> FloatArray:
         """The sound form's test metric with another covariance, (E, N) [-]."""
-        complete = np.isfinite(self.double_mps).all(axis=2) & np.isfinite(self.sound)[:, np.newaxis]
+        complete = np.asarray(np.isfinite(self.double_mps).all(axis=2) & np.isfinite(self.sound)[:, np.newaxis])
         receivers = complete.sum(axis=1)
         total = np.where(complete[:, :, np.newaxis], self.double_mps, 0.0).sum(axis=1)
         mean = np.where(receivers[:, np.newaxis] > 0, total / np.maximum(receivers, 1)[:, np.newaxis], np.nan)
@@ -189,7 +189,8 @@ class MonitoredSeries:
         """Covariance from the epochs `chosen`, with so many bins of elevation holding about as many samples each."""
         values = np.where(np.isfinite(self.sound)[:, np.newaxis, np.newaxis], self.double_mps, np.nan)[chosen]
         elevation = self.elevation_rad[chosen]
-        there = elevation[np.isfinite(values).all(axis=2).any(axis=1)]
+        complete = np.asarray(np.isfinite(values).all(axis=2))
+        there = elevation[complete.any(axis=1)]
         edges = np.quantile(there, np.linspace(0.0, 1.0, bins + 1))
         edges[-1] = np.nextafter(edges[-1], np.inf)
         return calibrate(
@@ -234,15 +235,24 @@ def monitor_epochs(
     single, double
         Settings of the monitors.
     """
-    return _Run(ephemerides, antennas_m, single, double).over(epochs)
+    observer = Observer(ephemerides, antennas_m, single.filters.max_gap_s)
+    return _Run(observer, len(antennas_m), single, double).over(epochs)
 
 
-class _Run:
-    """Steps everything an epoch needs; a second pair of monitors without filters gives the rates before filtering."""
+class Observer:
+    """Turns epochs into what the monitors are given: geometry, slips and masks as a station makes them.
 
-    def __init__(
-        self, ephemerides: Sequence[Ephemeris], antennas_m: FloatArray, single: CcdParams, double: TwoFrequencyParams
-    ) -> None:
+    Parameters
+    ----------
+    ephemerides : sequence of Ephemeris
+        As received.
+    antennas_m : (R, 3) array
+        ECEF [m].
+    max_gap_s : float
+        Longest interval over which slips are looked for [s].
+    """
+
+    def __init__(self, ephemerides: Sequence[Ephemeris], antennas_m: FloatArray, max_gap_s: float) -> None:
         count = len(antennas_m)
         self._station = station_params(antennas_m)
         self._site = site_of(self._station)
@@ -251,75 +261,19 @@ class _Run:
         for each in ephemerides:
             self._queue.add(epoch_key(each.gps_week, each.tow_s), each)
         self._slips, self._present = initial_slips(count), np.zeros((count, N_BANDS, N_SATS), dtype=bool)
-        raw = replace(single.filters, tau_s=1e-6, settle_s=0.0)
-        self._params = ((single, double), (replace(single, filters=raw), replace(double, filters=raw)))
-        self._states = [(initial_ccd(a, count), initial_two_frequency(b, count)) for a, b in self._params]
-        self._failed = np.zeros(N_SATS, dtype=bool)
+        self._params = SlipParams(max_gap_s=max_gap_s, follow_code_steps=True)
 
-    def over(self, epochs: Iterable[RecordedEpoch]) -> MonitoredSeries:
-        rows: list[dict[str, NDArray[np.generic]]] = []
-        keys: list[int] = []
-        for epoch in epochs:
-            dt_s = (epoch.key - keys[-1]) / 1000.0 if keys else float("nan")
-            keys.append(epoch.key)
-            rows.append(self._step(epoch, dt_s))
-        values = {name: np.array([row[name] for row in rows]) for name in rows[0]}
-        time_s = (np.array(keys) - keys[0]) / 1000.0
-        names = [name for name in values if name.startswith("gast")]
-        alarms = {name: values.pop(name) for name in names}
-        gaps = np.diff(time_s)
-        lost = int((gaps > 1.5 * np.median(gaps)).sum())
-        return MonitoredSeries(time_s=time_s, alarms=alarms, epochs_lost=lost, **values)
-
-    def _step(self, epoch: RecordedEpoch, dt_s: float) -> dict[str, NDArray[np.generic]]:
-        seen = self._input(epoch, dt_s)
-        results = []
-        for place, (single, double) in enumerate(self._params):
-            before = self._states[place]
-            first, one = ccd_step(
-                before[0], seen.code_m, seen.carrier_m, seen.restarted, seen.used, dt_s, single
-            )
-            second, two = two_frequency_step(before[1], seen, dt_s, double)
-            self._states[place] = (first, second)
-            results.append((one, two))
-        (one, two), (raw_one, raw_two) = results
-        self._failed = two.sound.failed
-        bands = {f"gast-d {name}": one.satellites.failed[band] for name, band in (("L1", L1), ("L2", L2), ("L5", L5))}
-        counts = one.settled & seen.used[:, np.newaxis]
-        both = self._counts(counts)
-        return {
-            "single_mps": np.where(counts, one.receiver_mps, np.nan),
-            "single_rate_mps": np.where(counts, raw_one.receiver_mps, np.nan),
-            "double_mps": np.where(both, two.receiver_mps.swapaxes(0, 1), np.nan),
-            "double_rate_mps": np.where(both, raw_two.receiver_mps.swapaxes(0, 1), np.nan),
-            "paper": two.paper.statistic,
-            "sound": two.sound.statistic,
-            "single_mean_mps": one.mean_mps,
-            "elevation_rad": seen.elevation_rad,
-            "clock_satellites": two.clock_satellites,
-            **bands,
-            "gast-f-paper": two.paper.failed,
-            "gast-f-sound": two.sound.failed,
-        }
-
-    def _counts(self, counts: BoolArray) -> BoolArray:
-        """Where both bands' filters have settled, (R, 1, N)."""
-        double = self._params[0][1]
-        result: BoolArray = (counts[:, double.band] & counts[:, double.other])[:, np.newaxis]
-        return result
-
-    def _input(self, epoch: RecordedEpoch, dt_s: float) -> TwoFrequencyInput:
+    def see(self, epoch: RecordedEpoch, dt_s: float, failed: BoolArray) -> TwoFrequencyInput:
+        """The next epoch; satellites that `failed` are not in the receivers' clocks."""
         week, tow_s = from_epoch_key(epoch.key)
         for each in self._queue.take(epoch.key):
             self._known, _ = station_ephemerides.receive(self._known, each, week, tow_s, self._station)
         self._known, changed, _ = station_ephemerides.choose(self._known, week, tow_s, self._station)
         raw = stack(epoch.ground, satellites_of("GE"))
         should = expected(self._known.current, week, tow_s, raw.code_m[:, L1], self._site)
-        gap_s = self._params[0][0].filters.max_gap_s
         self._slips, found = slip_step(
-            self._slips, raw.code_m, raw.carrier_m, raw.doppler_hz, raw.lli, dt_s,
-            SlipParams(max_gap_s=gap_s, follow_code_steps=True),
-            range_m=np.where(changed, np.nan, should.range_m - 299_792_458.0 * should.clock_s),
+            self._slips, raw.code_m, raw.carrier_m, raw.doppler_hz, raw.lli, dt_s, self._params,
+            range_m=np.where(changed, np.nan, should.range_m - SPEED_OF_LIGHT_MPS * should.clock_s),
         )  # fmt: skip
         # A channel that was away is not protected by the slip tests: it starts anew, as its smoothing filter does.
         present = np.isfinite(raw.code_m + raw.carrier_m)
@@ -336,8 +290,62 @@ class _Run:
             rebased=changed,
             elevation_rad=should.elevation_rad,
             used=used,
-            clock_used=used & ~self._failed,
+            clock_used=used & ~failed,
         )
+
+
+class _Run:
+    """Both monitors; a second pair of them without filters gives the rates before filtering."""
+
+    def __init__(self, observer: Observer, n_receivers: int, single: CcdParams, double: TwoFrequencyParams) -> None:
+        self._observer = observer
+        raw = replace(single.filters, tau_s=1e-6, settle_s=0.0)
+        self._params = ((single, double), (replace(single, filters=raw), replace(double, filters=raw)))
+        self._states = [(initial_ccd(a, n_receivers), initial_two_frequency(b, n_receivers)) for a, b in self._params]
+        self._failed = np.zeros(N_SATS, dtype=bool)
+
+    def over(self, epochs: Iterable[RecordedEpoch]) -> MonitoredSeries:
+        rows: list[dict[str, NDArray[np.generic]]] = []
+        keys: list[int] = []
+        for epoch in epochs:
+            dt_s = (epoch.key - keys[-1]) / 1000.0 if keys else float("nan")
+            keys.append(epoch.key)
+            rows.append(self._step(self._observer.see(epoch, dt_s, self._failed), dt_s))
+        values = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+        time_s = (np.array(keys) - keys[0]) / 1000.0
+        names = [name for name in values if name.startswith("gast")]
+        alarms = {name: values.pop(name) for name in names}
+        gaps = np.diff(time_s)
+        lost = int((gaps > 1.5 * np.median(gaps)).sum())
+        return MonitoredSeries(time_s=time_s, alarms=alarms, epochs_lost=lost, **values)
+
+    def _step(self, seen: TwoFrequencyInput, dt_s: float) -> dict[str, NDArray[np.generic]]:
+        results = []
+        for place, (single, double) in enumerate(self._params):
+            before = self._states[place]
+            first, one = ccd_step(before[0], seen.code_m, seen.carrier_m, seen.restarted, seen.used, dt_s, single)
+            second, two = two_frequency_step(before[1], seen, dt_s, double)
+            self._states[place] = (first, second)
+            results.append((one, two))
+        (one, two), (raw_one, raw_two) = results
+        self._failed = two.sound.failed
+        double = self._params[0][1]
+        counts = one.settled & seen.used[:, np.newaxis]
+        both = (counts[:, double.band] & counts[:, double.other])[:, np.newaxis]
+        return {
+            "single_mps": np.where(counts, one.receiver_mps, np.nan),
+            "single_rate_mps": np.where(counts, raw_one.receiver_mps, np.nan),
+            "double_mps": np.where(both, two.receiver_mps.swapaxes(0, 1), np.nan),
+            "double_rate_mps": np.where(both, raw_two.receiver_mps.swapaxes(0, 1), np.nan),
+            "paper": two.paper.statistic,
+            "sound": two.sound.statistic,
+            "single_mean_mps": one.mean_mps,
+            "elevation_rad": seen.elevation_rad,
+            "clock_satellites": two.clock_satellites,
+            **{f"gast-d {name}": one.satellites.failed[band] for band, name in enumerate(BANDS)},
+            "gast-f-paper": two.paper.failed,
+            "gast-f-sound": two.sound.failed,
+        }
 
 
 def station_params(antennas_m: FloatArray) -> GroundParams:
