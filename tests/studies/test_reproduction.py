@@ -55,6 +55,7 @@ def test_verdicts() -> None:
     assert value(0.1277, paper="0.1299", point=0.1277, why="no point has it").verdict is Verdict.DIFFERS
     assert value(766.45, paper="766", tolerance=1.0, why="the paper truncates").verdict is Verdict.REPRODUCED
     assert value(766.6, paper="766", tolerance=1.0, why="the paper truncates").verdict is Verdict.CLOSE
+    assert value(0.2, paper="0.1", comparable=False, why="our data").verdict is Verdict.OTHER
     assert value(None, why="no data").verdict is Verdict.LEFT_OUT
     assert value(float("nan"), paper="0.1", why="diverged").verdict is Verdict.DIFFERS
 

@@ -13,6 +13,7 @@ process     ``gbas process`` on recorded files as a multiple of real time, and a
 latency     live nodes at 2 Hz: from observations to bursts and to protection levels, against 50 ms
 replay      live nodes with a recorder, data as fast as they are taken, against 100 times real time at 2 Hz
 files       the same with recorded receiver files
+ccd         the full sweep of the divergence study against 1 s, and its monitors against 2 ms an epoch
 ==========  ===========================================================================================================
 
 The live parts start each node as its own process. Wall times and speeds hold for this machine with what else runs on
@@ -34,12 +35,13 @@ from gbas_bringup.bench_figures import Part, document, environment
 from gbas_bringup.cli_base import data_folder
 from gbas_bringup.errors import GbasError
 
-PARTS: Final = ("steps", "simulator", "siting", "offline", "process", "latency", "replay", "files")
+PARTS: Final = ("steps", "simulator", "ccd", "siting", "offline", "process", "latency", "replay", "files")
 LATENCY_S: Final = 40.0
 QUICK_LATENCY_S: Final = 8.0
 _STEP_EPOCHS: Final = (300, 60)
 _WORLD_EPOCHS: Final = (1000, 100)
 _SITING_CANDIDATES: Final = (4_000_000, 1_000_000)
+_MONITOR_EPOCHS: Final = (1000, 100)
 _REPLAY_EPOCHS: Final = (1200, 300)
 _BUSY_LOAD: Final = 0.5
 
@@ -97,7 +99,7 @@ def run_bench(
 
 def _measures(out: Path, quick: bool, seconds: float | None, data: Path | None) -> Mapping[str, Callable[[], Part]]:
     """What measures each part; the libraries are loaded when they are needed."""
-    from gbas_bringup import bench_live, bench_offline, bench_peer, bench_sim, bench_siting
+    from gbas_bringup import bench_ccd, bench_live, bench_offline, bench_peer, bench_sim, bench_siting
 
     make_flight = cache(bench_offline.make_flight)
     step_epochs = bench_offline.SETTLE_EPOCHS + _STEP_EPOCHS[quick]
@@ -111,6 +113,7 @@ def _measures(out: Path, quick: bool, seconds: float | None, data: Path | None) 
         "latency": lambda: bench_live.measure_latency(out / "latency", seconds=latency_s),
         "replay": lambda: bench_live.measure_replay(out / "replay", n_epochs=_REPLAY_EPOCHS[quick]),
         "files": lambda: bench_live.measure_files(out / "files", data),
+        "ccd": lambda: bench_ccd.measure_ccd(_MONITOR_EPOCHS[quick]),
     }
 
 

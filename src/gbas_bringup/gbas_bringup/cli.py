@@ -15,7 +15,7 @@ from typing import Annotated, Any
 
 import typer
 
-from gbas_bringup import __version__, cli_reproduce, cli_siting
+from gbas_bringup import __version__, cli_reproduce, cli_siting, cli_study
 from gbas_bringup.cli_base import (
     GbasGroup,
     Json,
@@ -49,6 +49,7 @@ app.add_typer(sim_app, name="sim")
 app.add_typer(vdb_app, name="vdb")
 cli_reproduce.register(app)
 cli_siting.register(app)
+cli_study.register(app)
 
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Show every line the nodes write.")]
 Speed = Annotated[str, typer.Option("--speed", help="'max', or a multiple of real time.", metavar="max|N")]
@@ -296,7 +297,7 @@ def bench(
     part: Annotated[
         list[str] | None,
         typer.Option(
-            help="Only this: steps, simulator, siting, offline, process, latency, replay or files; may be repeated."
+            help="Only this: steps, simulator, ccd, siting, offline, process, latency, replay or files; may be repeated."
         ),
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Short runs: less exact.")] = False,

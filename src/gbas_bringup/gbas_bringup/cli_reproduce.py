@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 _WIDE = 150
 """Columns of the table in a file or a pipe."""
 _STYLES = {
-    "REPRODUCED": "green", "CLOSE": "green", "POINT": "yellow", "DIFFERS": "red", "NEW": "blue", "LEFT_OUT": "dim",
+    "REPRODUCED": "green", "CLOSE": "green", "POINT": "yellow", "DIFFERS": "red", "OTHER": "cyan", "NEW": "blue",
+    "LEFT_OUT": "dim",
 }  # fmt: skip
 
 

@@ -54,6 +54,18 @@ class Classification:
         return tuple(MODES[place] for place in np.flatnonzero(column >= column.max() * (1.0 - 1e-9)))
 
 
+    def plausible(self, satellite: int, mass: float = 0.95) -> tuple[str, ...]:
+        """Fewest modes that together have so much of the posterior, from the most to the least likely."""
+        column = self.posterior[:, satellite]
+        if not np.isfinite(column).all():
+            return ()
+        order = np.argsort(-column, kind="stable")
+        count = int(np.searchsorted(np.cumsum(column[order]), mass)) + 1
+        # Modes that cannot be told apart come together or not at all.
+        least = column[order[min(count, len(order)) - 1]] * (1.0 - 1e-9)
+        return tuple(MODES[place] for place in order if column[place] >= least)
+
+
 @lru_cache(maxsize=8)
 def _columns(band: int, other: int) -> FloatArray:
     """Effect of the four measurements on the three statistics, (3, 4)."""

@@ -5,9 +5,9 @@ the ionosphere-free carrier (IF), from which geometry, satellite clock, troposph
 rates are filtered as for GAST D and averaged over receivers, and a quadratic form of the means is compared with a
 quantile of chi-square. Two forms run side by side:
 
-- *paper*: four statistics, with ionosphere-free code minus carrier, the printed covariance and its pseudo-inverse,
-  4 degrees of freedom, threshold 47.8795. The fourth is a combination of the first two and the printed covariance has a
-  negative eigenvalue (-6.2e-11 (m/s)^2): the form is kept so that the paper can be reproduced.
+- *paper* (L1 and L5 only): four statistics, with ionosphere-free code minus carrier, the printed covariance and its
+  pseudo-inverse, 4 degrees of freedom, threshold 47.8795. The fourth is a combination of the first two, and the printed
+  covariance has a negative eigenvalue (-6.2e-11 (m/s)^2): the form is kept so that the paper can be reproduced.
 - *sound*: DF, DF, IF carrier with a covariance of their own (:mod:`~.divergence_covariance`), 3 degrees of freedom,
   threshold 44.84.
 
@@ -238,10 +238,17 @@ def two_frequency_step(
         receivers=receivers,
         clock_satellites=np.where(receivers > 0, n_clock, np.nan),
         covariance=covariance,
-        paper=upper_limit(paper_form(means, receivers), threshold("paper", params.p_false_alarm), receivers > 0),
+        paper=_paper(means, receivers, params),
         sound=upper_limit(sound_form(rates, covariance), threshold("sound", params.p_false_alarm), receivers > 0),
     )
     return replace(new, codes=codes), result
+
+
+def _paper(means_mps: FloatArray, receivers: FloatArray, params: TwoFrequencyParams) -> MonitorResult:
+    """The paper's form, for L1 and L5 alone: its covariance is of these, and so singular only with their ratio."""
+    applies = (receivers > 0) & ((params.band, params.other) == (L1, L5))
+    statistic = np.where(applies, paper_form(means_mps, receivers), np.nan)
+    return upper_limit(statistic, threshold("paper", params.p_false_alarm), applies)
 
 
 def with_iono_free_code(rates_mps: FloatArray, band: int, other: int) -> FloatArray:

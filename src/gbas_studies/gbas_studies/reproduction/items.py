@@ -23,6 +23,7 @@ class Verdict(Enum):
     CLOSE = "≈"
     POINT = "●"
     DIFFERS = "✗"
+    OTHER = "○"
     NEW = "+"
     LEFT_OUT = "–"
 
@@ -37,6 +38,7 @@ _WORDS = {
     Verdict.CLOSE: "close, within a stated tolerance",
     Verdict.POINT: "printed value is that of one point, not of the extremum it is given for",
     Verdict.DIFFERS: "differs, for the reason given",
+    Verdict.OTHER: "measured on other data than the paper's: not comparable digit by digit",
     Verdict.NEW: "not in the paper",
     Verdict.LEFT_OUT: "left out, for the reason given",
 }
@@ -95,8 +97,11 @@ class Value:
     tolerance : float or None
         Distance [`unit`] within which a value that misses the printed digits still counts as close, such as for a
         paper that truncates. `why` says where it comes from.
+    comparable : bool
+        False: ours comes from other data than the paper's, and `why` says from which.
     why : str
-        Why the value differs, is a point value, is only close, or was left out. Needed for all four.
+        Why the value differs, is a point value, is only close, is not comparable, or was left out. Needed for all of
+        these.
     """
 
     name: str
@@ -106,6 +111,7 @@ class Value:
     paper: str | None = None
     point: float | None = None
     tolerance: float | None = None
+    comparable: bool = True
     why: str = ""
 
     def __post_init__(self) -> None:
@@ -123,6 +129,8 @@ class Value:
             return Verdict.LEFT_OUT
         if self.paper is None:
             return Verdict.NEW
+        if not self.comparable:
+            return Verdict.OTHER
         if agrees(self.paper, self.ours):
             return Verdict.REPRODUCED
         if self.point is not None and agrees(self.paper, self.point):
