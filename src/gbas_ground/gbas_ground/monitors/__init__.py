@@ -7,13 +7,21 @@ business but the executive's (:mod:`gbas_ground.executive`).
 
 ===================================  ==========================================================
 :mod:`~.expected_range`              raw pseudorange against the expected one
-:mod:`~.signal_power`                C/N0
+:mod:`~.signal_power`                C/N0: absolute minimum
+:mod:`~.power_expectation`           C/N0 against the expectation at the elevation
 :mod:`~.multiple_reference`          B values (MRCC)
+:mod:`~.sigma_monitor`               mean and variance of the B values over time
 :mod:`~.correction_limits`           size of PRC and RRC
+:mod:`~.carrier_acceleration`        step, rate and acceleration of the carrier
+:mod:`~.ionosphere_gradient`         double-difference carriers: gradients of the ionosphere
+:mod:`~.ephemeris_residual`          double-difference carriers: the orbit, and the P a site can claim
 :mod:`~.ephemeris_change`            a new ephemeris against the one before
 :mod:`~.code_carrier_divergence`     code-carrier divergence of single bands (GAST D)
 :mod:`~.two_frequency_divergence`    the same on two bands, without ionosphere (proposed for GAST F)
 :mod:`~.divergence_covariance`       covariance of its statistics, calibrated from data
 :mod:`~.divergence_classification`   which of the fifteen fault modes it looks like
 ===================================  ==========================================================
+
+What they share: :mod:`~.result`, the double differences (:mod:`~.double_difference`), the sigma of a carrier
+(:mod:`~.carrier_noise`) and the budget of false alarms (:mod:`~.false_alarm`).
 """

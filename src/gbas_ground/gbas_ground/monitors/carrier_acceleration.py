@@ -250,7 +250,7 @@ def _judged(
     change = history_m - history_m[0]
     there = np.isfinite(change)
     change = np.where(there, change, 0.0)
-    powers = np.where(np.isfinite(age_s), -age_s, 0.0) ** np.arange(5)[:, np.newaxis]
+    powers = np.where(np.isfinite(age_s), -age_s, 0.0) ** np.arange(5.0)[:, np.newaxis]
     s = (powers @ there.reshape(len(there), sigma_m.size).astype(np.float64)).reshape(5, *sigma_m.shape)
     epochs = there.any(axis=-1, keepdims=True).sum(axis=0)
     in_set = (s[0] == epochs) & there[0] & (sigma_m > 0.0)

@@ -33,7 +33,7 @@ from gbas_core.record import FloatArray
 from gbas_core.satellites import N_SATS
 from gbas_core.signals import SPEED_OF_LIGHT_MPS, WAVELENGTH_M
 from gbas_ground.corrections import CLOCK_GROUPS, BoolArray
-from gbas_ground.gradient_detectability import wrap_m
+from gbas_ground.gradient_detectability import Fuse, wrap_m
 from gbas_ground.monitors.carrier_noise import CarrierNoise
 
 IntArray = NDArray[np.int64]
@@ -274,3 +274,37 @@ def _middle(
     there = np.isfinite(residual)
     spread = np.where(there, np.take_along_axis(sigma, middle, axis=-1)[..., 0], np.nan)
     return residual, spread, np.where(there, chosen, NO_REFERENCE)
+
+
+def decided(statistic: FloatArray, threshold: FloatArray, fuse: Fuse = "any") -> tuple[FloatArray, FloatArray]:
+    """Statistic and threshold of the baseline and band that decide about each satellite.
+
+    Parameters
+    ----------
+    statistic, threshold : (B, F, N) arrays
+        NaN where there is none.
+    fuse : {"any", "all"}
+        The worst of all; or the worst of the bands' best baselines, so that all of a band have to fail.
+
+    Returns
+    -------
+    (N,) arrays
+        NaN for a satellite without a statistic.
+    """
+    n_sats = statistic.shape[-1]
+    if statistic.size == 0:  # a single receiver
+        return np.full(n_sats, np.nan), np.full(n_sats, np.nan)
+    place, each = _deciding(statistic / threshold, fuse), np.arange(n_sats)
+    return statistic.reshape(-1, n_sats)[place, each], threshold.reshape(-1, n_sats)[place, each]
+
+
+def _deciding(ratio: FloatArray, fuse: Fuse) -> IntArray:
+    """Baseline and band (N,), flattened, that decide: the worst, or the worst of the bands' best; NaN is none."""
+    n_bands, n_sats = ratio.shape[1:]
+    if fuse == "any":
+        flat = ratio.reshape(-1, n_sats)
+        return np.asarray(np.argmax(np.where(np.isnan(flat), -1.0, flat), axis=0))
+    best = np.argmin(np.where(np.isnan(ratio), np.inf, ratio), axis=0)  # (F, N)
+    least = np.take_along_axis(ratio, best[np.newaxis], axis=0)[0]
+    band = np.argmax(np.where(np.isnan(least), -1.0, least), axis=0)
+    return np.asarray(best[band, np.arange(n_sats)] * n_bands + band)

@@ -41,7 +41,7 @@ from gbas_ground.gradient_detectability import (
     projected_length_m,
 )
 from gbas_ground.monitors.carrier_noise import CarrierNoise
-from gbas_ground.monitors.double_difference import Baselines, DoubleDifferences, IntArray, Pairing, baselines_of
+from gbas_ground.monitors.double_difference import Baselines, DoubleDifferences, Pairing, baselines_of, decided
 from gbas_ground.monitors.false_alarm import FALSE_EXCLUSION, false_alarm_multiplier
 from gbas_ground.monitors.result import MonitorResult, upper_limit
 
@@ -200,7 +200,7 @@ def check_ionosphere_gradient(
     by_baseline = upper_limit(np.where(looked, np.abs(differences.residual_m), np.nan), threshold, looked)
     coverage = _coverage(differences.sigma_m, looked, site, params)
     monitored = (coverage > 0.0) & (coverage >= params.min_coverage)
-    statistic, limit = _decided(by_baseline.statistic, threshold, params.fuse)
+    statistic, limit = decided(by_baseline.statistic, threshold, params.fuse)
     exceeded = due & (statistic > limit)
     failed = exceeded | (due & ~monitored) if params.required else exceeded
     return GradientResult(
@@ -210,27 +210,6 @@ def check_ionosphere_gradient(
         coverage=coverage,
         gradient=_smallest_gradients(exceeded, differences, looked, site.length_m[0], params.bands),
     )
-
-
-def _decided(statistic: FloatArray, threshold: FloatArray, fuse: Fuse) -> tuple[FloatArray, FloatArray]:
-    """Statistic and threshold (N,) of the baseline and band that decide; NaN where there is none."""
-    n_sats = statistic.shape[-1]
-    if statistic.size == 0:  # a single receiver
-        return np.full(n_sats, np.nan), np.full(n_sats, np.nan)
-    place, each = _deciding(statistic / threshold, fuse), np.arange(n_sats)
-    return statistic.reshape(-1, n_sats)[place, each], threshold.reshape(-1, n_sats)[place, each]
-
-
-def _deciding(ratio: FloatArray, fuse: Fuse) -> IntArray:
-    """Baseline and band (N,), flattened, that decide: the worst, or the worst of the bands' best; NaN is none."""
-    n_bands, n_sats = ratio.shape[1:]
-    if fuse == "any":
-        flat = ratio.reshape(-1, n_sats)
-        return np.asarray(np.argmax(np.where(np.isnan(flat), -1.0, flat), axis=0))
-    best = np.argmin(np.where(np.isnan(ratio), np.inf, ratio), axis=0)  # (F, N)
-    least = np.take_along_axis(ratio, best[np.newaxis], axis=0)[0]
-    band = np.argmax(np.where(np.isnan(least), -1.0, least), axis=0)
-    return np.asarray(best[band, np.arange(n_sats)] * n_bands + band)
 
 
 def _coverage(

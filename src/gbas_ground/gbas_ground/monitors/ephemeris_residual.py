@@ -1,0 +1,250 @@
+"""Ephemeris monitor: a satellite that is not where its broadcast orbit says, by double-difference carriers.
+
+A displacement across the line of sight turns the line of sight, and the double difference over a baseline grows by the
+baseline times that angle: 1 km at 20 000 km over 700 m makes 35 mm. The statistic is that of the gradient monitor
+(:mod:`~gbas_ground.monitors.double_difference`), but followed from epoch to epoch through the half wavelengths: an
+orbit that leaves its ephemeris slowly, by a manoeuvre (type A fault), does not come back to zero at 5 km. It begins
+within half a wavelength; what bounds the orbit then is the new ephemeris against the old one
+(:mod:`~gbas_ground.monitors.ephemeris_change`, type B faults) and the code against its expected range. Following needs
+no slip detection, because a slip is whole wavelengths.
+
+An orbit that is wrong already when its satellite is first seen is found only if it is not near whole wavelengths on all
+baselines.
+
+What a site can claim (:func:`decorrelation`, :func:`site_decorrelation`): the largest angle its baselines do not
+detect is the parameter P of the broadcast, P = MDE / range. A single baseline, or several in one line, see an orbit
+only in one direction and bound nothing in the other: P is then infinite, and without another monitor for that direction
+the station must not rely on this one.
+
+A double difference does not tell an orbit from an ionosphere gradient: whichever monitor fails first excludes the
+satellite.
+
+Source: fact of the LAAS/GBAS literature: Pullen, Lee, Luo, Pervan, Chan, Gratton, Ephemeris protection level equations
+and monitor algorithms for GBAS, ION GPS 2001 (types A and B, P = MDE / range); Tang, Pullen, Enge, Gratton, Pervan,
+Brenner, Scheitlin, Kline, Ephemeris type A fault analysis and mitigation for LAAS, IEEE/ION PLANS 2010 (baselines).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Final
+
+import numpy as np
+from scipy.stats import norm
+
+from gbas_core.record import FloatArray
+from gbas_core.satellites import N_SATS
+from gbas_core.signals import L1, L5, WAVELENGTH_M
+from gbas_ground.corrections import BoolArray
+from gbas_ground.monitors.carrier_noise import CarrierNoise
+from gbas_ground.monitors.double_difference import Baselines, DoubleDifferences, decided
+from gbas_ground.monitors.false_alarm import FALSE_EXCLUSION, false_alarm_multiplier
+from gbas_ground.monitors.result import MonitorResult, upper_limit
+
+_PARALLEL: Final = 1e-6  # sine of the angle below which two baselines, seen from the satellite, are one
+
+
+@dataclass(frozen=True, kw_only=True)
+class EphemerisResidualParams:
+    """Settings of the ephemeris monitor.
+
+    Attributes
+    ----------
+    bands : tuple of int
+        Carriers of the double differences.
+    p_false_alarm : float
+        For one source in 15 s, over all baselines and bands.
+    p_missed_detection : float
+        Of the orbit error that P is claimed for. Uncertain.
+    max_gap_s : float
+        Longest gap a double difference is followed across [s]: orbits move it by millimetres a minute.
+    required : bool
+        Satellites that are due and have no double difference fail.
+    """
+
+    bands: tuple[int, ...] = (L1, L5)
+    p_false_alarm: float = FALSE_EXCLUSION
+    p_missed_detection: float = 1.0e-4
+    max_gap_s: float = 60.0
+    required: bool = True
+
+    def __post_init__(self) -> None:
+        if not self.bands or len(set(self.bands)) != len(self.bands):
+            raise ValueError(f"ephemeris residual: bands is {self.bands}: at least one, each once")
+        if not 0.0 < self.p_missed_detection < 0.5:
+            raise ValueError(
+                f"ephemeris residual: p_missed_detection is {self.p_missed_detection}: it must be between 0 and 0.5"
+            )
+        if not (np.isfinite(self.max_gap_s) and self.max_gap_s > 0.0):
+            raise ValueError(f"ephemeris residual: max_gap_s is {self.max_gap_s}: it must be above 0 s")
+        false_alarm_multiplier(self.p_false_alarm)
+
+    def multiplier(self, n_baselines: int) -> float:
+        """Standard deviations of the threshold."""
+        return false_alarm_multiplier(self.p_false_alarm, tests=max(1, n_baselines) * len(self.bands))
+
+    @property
+    def k_md(self) -> float:
+        """Standard deviations for missed detection."""
+        return float(norm.isf(self.p_missed_detection))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class EphemerisResidualState:
+    """Double differences as they were followed.
+
+    Attributes
+    ----------
+    followed_m : (B, F, N) array
+        [m]; NaN where there is none.
+    unseen_s : (B, F, N) array
+        Time since each was last there; NaN if it never was [s].
+    """
+
+    followed_m: FloatArray
+    unseen_s: FloatArray
+
+
+def initial_ephemeris_residual(n_baselines: int, params: EphemerisResidualParams) -> EphemerisResidualState:
+    """A monitor that has seen nothing."""
+    nothing = np.full((n_baselines, len(params.bands), N_SATS), np.nan)
+    return EphemerisResidualState(followed_m=nothing, unseen_s=nothing)
+
+
+def ephemeris_residual_step(
+    state: EphemerisResidualState,
+    differences: DoubleDifferences,
+    baselines: Baselines,
+    due: BoolArray,
+    dt_s: float,
+    params: EphemerisResidualParams,
+    *,
+    shift_m: FloatArray | None = None,
+) -> tuple[EphemerisResidualState, MonitorResult]:
+    """Follow and test one epoch.
+
+    Parameters
+    ----------
+    state : EphemerisResidualState
+    differences : DoubleDifferences
+        Of `baselines` and `params.bands`.
+    baselines : Baselines
+    due : (N,) bool array
+        Satellites that must be monitored.
+    dt_s : float
+        Time since the epoch before [s]; NaN at the first.
+    params : EphemerisResidualParams
+    shift_m : (R, N) array, optional
+        What a new ephemeris changes in the residuals of this epoch, as for
+        :func:`~gbas_ground.monitors.carrier_acceleration.carrier_acceleration_step` [m].
+
+    Returns
+    -------
+    state : EphemerisResidualState
+    result : MonitorResult
+        ``(N,)``: size of the double difference of the baseline and band that is worst, and its threshold [m].
+    """
+    wavelength = WAVELENGTH_M[list(params.bands)][:, np.newaxis]
+    residual, there = differences.residual_m, np.isfinite(differences.residual_m)
+    elapsed = state.unseen_s + dt_s
+    goes_on = (elapsed > 0.0) & (elapsed <= params.max_gap_s)
+    before = state.followed_m
+    if shift_m is not None:
+        before = before + (shift_m[baselines.second] - shift_m[baselines.first])[:, np.newaxis]
+    followed = residual + np.where(goes_on, wavelength * np.rint((before - residual) / wavelength), 0.0)
+    threshold = params.multiplier(len(baselines)) * differences.sigma_m
+    statistic, limit = decided(np.abs(followed), threshold)
+    new = EphemerisResidualState(followed_m=np.where(there, followed, before), unseen_s=np.where(there, 0.0, elapsed))
+    applies = due if params.required else due & np.isfinite(statistic)
+    return new, upper_limit(statistic, limit, applies)
+
+
+def decorrelation(
+    vector_m: FloatArray, threshold_m: FloatArray, los_enu: FloatArray, *, descent_rad: float = 0.0
+) -> FloatArray:
+    """Largest error per metre of separation that an undetected orbit error causes: the parameter P of each satellite.
+
+    Parameters
+    ----------
+    vector_m : (B, 3) array
+        Baselines, east, north, up [m].
+    threshold_m : (B, N) array
+        Size of a double difference that is detected with the wanted probability: (k_ffd + k_md) sigma [m]. NaN where a
+        baseline does not see the satellite.
+    los_enu : (3, N) array
+        Unit vectors to the satellites.
+    descent_rad : float
+        Angle below the station's horizon that users are up to [rad]; they may be in any direction.
+
+    Returns
+    -------
+    (N,) array
+        P [m/m]; infinite without two baselines in different directions.
+
+    Notes
+    -----
+    An orbit error d across the line of sight, over the range, is an angle u. It is not detected while |b u| is below
+    the threshold of every baseline b: inside a polygon around zero. The user's error is u times the separation; its
+    largest value is at a corner of the polygon.
+    """
+    across = vector_m[:, :, np.newaxis] - np.einsum("bi,in->bn", vector_m, los_enu)[:, np.newaxis] * los_enu
+    largest = np.zeros(los_enu.shape[-1])
+    bounded = np.zeros(los_enu.shape[-1], dtype=bool)
+    seen = np.isfinite(threshold_m)
+    for i, j in combinations(range(len(vector_m)), 2):
+        normal = np.cross(across[i], across[j], axis=0)
+        area = (normal * los_enu).sum(axis=0)  # both lie across the line of sight
+        scale = np.linalg.norm(across[i], axis=0) * np.linalg.norm(across[j], axis=0)
+        apart = (np.abs(area) > _PARALLEL * scale) & seen[i] & seen[j]
+        bounded |= apart
+        with np.errstate(divide="ignore", invalid="ignore"):
+            for sign in (1.0, -1.0):  # the other two corners are opposite to these
+                # u with across_i u = T_i and across_j u = +-T_j, by the dual vectors in the plane
+                turned = np.cross(threshold_m[i] * across[j] - sign * threshold_m[j] * across[i], los_enu, axis=0)
+                corner = turned / area
+                inside = np.abs(np.einsum("bin,in->bn", across, corner)) <= threshold_m * (1.0 + 1e-9)
+                size = np.hypot(corner[0], corner[1]) * np.cos(descent_rad) + np.abs(corner[2]) * np.sin(descent_rad)
+                reached = apart & (inside | ~seen).all(axis=0)
+                largest = np.where(reached, np.maximum(largest, size), largest)
+    return np.where(bounded, largest, np.inf)
+
+
+def site_decorrelation(
+    baselines: Baselines,
+    elevation_rad: FloatArray,
+    azimuth_rad: FloatArray,
+    noise: CarrierNoise,
+    params: EphemerisResidualParams,
+    *,
+    reference_elevation_rad: float = float(np.radians(30.0)),
+    descent_rad: float = float(np.radians(3.0)),
+) -> FloatArray:
+    """P a site can claim for satellites at places in the sky.
+
+    Parameters
+    ----------
+    baselines : Baselines
+    elevation_rad, azimuth_rad : (N,) arrays
+        Places of the satellite.
+    noise : CarrierNoise
+    params : EphemerisResidualParams
+        The first band counts, so that the claim holds for satellites with it alone.
+    reference_elevation_rad : float
+        Elevation of the lowest reference satellite that has to be reckoned with [rad].
+    descent_rad : float
+        As of :func:`decorrelation`; an approach of 3 degrees.
+
+    Returns
+    -------
+    (N,) array
+        P [m/m]. The minimum detectable error of an orbit, across the line of sight, is P times the range.
+    """
+    factors = noise.factors(len(baselines.place_m))
+    scale = np.hypot(factors[baselines.first], factors[baselines.second])[:, np.newaxis]
+    sigma = noise.sigma_m(elevation_rad, params.bands[:1])
+    reference = noise.sigma_m(np.array([reference_elevation_rad]), params.bands[:1])
+    threshold = (params.multiplier(len(baselines)) + params.k_md) * scale * np.hypot(sigma, reference)
+    level = np.cos(elevation_rad)
+    los = np.stack([level * np.sin(azimuth_rad), level * np.cos(azimuth_rad), np.sin(elevation_rad)])
+    return decorrelation(baselines.vector_m, threshold, los, descent_rad=descent_rad)
