@@ -111,7 +111,7 @@ def test_no_file_is_left_behind(package: Path) -> None:
     patterns = setup_arguments(package)["package_data"][package.name]
     inner = package / package.name
     for path in inner.rglob("*"):
-        if path.is_file() and path.suffix not in (".py", ".pyc"):
+        if path.is_file() and path.suffix != ".py" and "__pycache__" not in path.parts:
             relative = path.relative_to(inner).as_posix()
             assert any(fnmatch(relative, pattern) for pattern in patterns), f"{relative} is not installed"
     folders = {path.parent for path in modules(package)}

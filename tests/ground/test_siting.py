@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from gbas_core.signals import IONO_RATIO, L1, L5, WAVELENGTH_M
@@ -40,7 +40,8 @@ def worst_m(*lengths_m: float, **more: object) -> float:
     st.sampled_from([(L1,), (L5,), (L1, L5)]),
     st.booleans(),
 )
-@settings(max_examples=150)
+@example([(0.0, -1.0), (122.0, 5.0)], (L1, L5), True)  # a term that only rises
+@settings(max_examples=200)
 def test_breakpoints_find_what_a_dense_grid_finds(monitors: list, bands: tuple[int, ...], slackened: bool):
     """Both kernels: one wavelength, and several; with tolerances and interval widths, and without."""
     slopes = np.array([length for length, _ in monitors])

@@ -187,9 +187,7 @@ def _place(arguments: dict[str, Any], signal: str, as_json: bool) -> None:
     with progress("searching", enabled=not as_json):
         best = best_siting(SitingProblem(**arguments))
     if best.statistic_m == 0.0:
-        raise GbasError(
-            "siting: no places within the bounds detect every gradient; allow more length or less tolerance"
-        )
+        raise GbasError("siting: no places within --tolerance-m and --max-length-m detect every gradient")
     if as_json:
         print_json(_siting_document(best, signal))
         return

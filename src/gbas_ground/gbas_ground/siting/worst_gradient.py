@@ -193,7 +193,7 @@ def _mixed(
     for i in range(slope.size):
         for j in range(slope.size):
             span = (slope[i] + slack[i]) + (slope[j] - slack[j])
-            if not (span > 0.0 and slope[i] > 0.0 and slope[j] > 0.0):
+            if not (span > 0.0 and slope[i] > 0.0):
                 continue
             for p in range(
                 int(np.ceil(low * slope[i] / wavelength[i])), int(high * slope[i] / wavelength[i] + 0.5) + 1
