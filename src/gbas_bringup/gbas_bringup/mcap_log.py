@@ -193,9 +193,7 @@ class McapLog:
         return self._span
 
 
-def rosbag2_metadata(
-    file_name: str, topics: Iterable[Topic], span: _Span, custom: Mapping[str, str]
-) -> dict[str, Any]:
+def rosbag2_metadata(file_name: str, topics: Iterable[Topic], span: _Span, custom: Mapping[str, str]) -> dict[str, Any]:
     """The record rosbag2 keeps of a bag (metadata version 9), in ``metadata.yaml`` and in the file itself."""
     start = {"nanoseconds_since_epoch": span.first_ns}
     duration = {"nanoseconds": max(0, span.last_ns - span.first_ns)}
@@ -221,9 +219,7 @@ def rosbag2_metadata(
         "compression_format": "",
         "compression_mode": "",
         "relative_file_paths": [file_name],
-        "files": [
-            {"path": file_name, "starting_time": start, "duration": duration, "message_count": span.count}
-        ],
+        "files": [{"path": file_name, "starting_time": start, "duration": duration, "message_count": span.count}],
         "custom_data": dict(custom) or None,
         "ros_distro": ROS_DISTRO,
     }

@@ -193,8 +193,10 @@ class McapScan:
             self.damages.append(Damage(at, f"{found - at} bytes are no MCAP records"))
             return found
         left = len(view) - at
-        what = f"the file is cut off in a record; its last {left} bytes are lost" if known or left < _RECORD.size else (
-            f"the last {left} bytes are no MCAP records"
+        what = (
+            f"the file is cut off in a record; its last {left} bytes are lost"
+            if known or left < _RECORD.size
+            else (f"the last {left} bytes are no MCAP records")
         )
         self.damages.append(Damage(at, what))
         return len(view)

@@ -17,9 +17,7 @@ from gbas_bringup.progress import progress
 _TICK_S = 0.25
 
 
-def execute(
-    plan: RunPlan, *, title: str, verbose: bool = False, quiet: bool = False, total: int | None = None
-) -> None:
+def execute(plan: RunPlan, *, title: str, verbose: bool = False, quiet: bool = False, total: int | None = None) -> None:
     """Run a plan to its end.
 
     Parameters
