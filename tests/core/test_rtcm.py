@@ -6,7 +6,7 @@ import gzip
 import inspect
 import math
 import random
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from fractions import Fraction
 from functools import lru_cache
 from pathlib import Path
@@ -25,6 +25,7 @@ from gbas_core.rtcm import RtcmError, is_rtcm, read_rtcm, read_rtcm_navigation
 from gbas_core.rtcm.ephemeris_fields import _sisa_m, _ura_m
 from gbas_core.satellites import SAT_IDS, SAT_INDEX
 from gbas_core.signals import BAND_INDEX, L1, L2, L5, SPEED_OF_LIGHT_MPS, WAVELENGTH_M
+from rtcm_writer import LOCKED, MS_M, cell, frames_of, msm
 
 FW206 = "raw_streams/fw206mrtk_rtcm.rtcm3"
 ROMA = "raw_streams/ROMAMSG.bin"
@@ -33,42 +34,9 @@ IMU = "raw_streams/imu_rtcm.rtcm3"
 WEEK = 2300
 """A week for streams that do not say theirs; nothing tested depends on it."""
 QUANTITIES = ("code_m", "carrier_m", "doppler_hz", "cn0_dbhz", "lli")
-LOCKED = 15
-"""Lock time indicator DF402: locked for at least 524 s."""
-MS_M = Fraction(299_792_458, 1000)
 
 
 # -- streams made with the library's encoder --------------------------------------------------------------------------
-
-
-def cell(satellite: int = 5, signal: int = 2, **changes: Any) -> dict[str, Any]:
-    """One satellite with one signal, in the integers of the message."""
-    values = {"whole": 70, "part": 512, "code": 0, "phase": 0, "lock": LOCKED, "half": False, "cnr": 45}
-    return {"satellite": satellite, "signal": signal, "rough_rate": 0, "rate": 0} | values | changes
-
-
-def msm(
-    tow_ms: int, cells: Sequence[dict[str, Any]], *, number: int = 1074, station: int = 7, smoothing: int = 0
-) -> bytes:
-    """Frame of a multiple signal message; satellites and signals in the order of the message."""
-    kind, system = f"msm{number % 10}", {107: "G", 108: "R", 109: "E", 112: "C"}[number // 10]
-    rates = kind in ("msm5", "msm7")
-    header = sidereon.RtcmMsmHeader(station, tow_ms, False, 0, 0, 0, 0, False, smoothing)
-    satellites = {
-        each["satellite"]: sidereon.RtcmMsmSatellite(
-            each["satellite"], each["whole"], each["part"], 0 if rates else None, each["rough_rate"] if rates else None
-        )
-        for each in cells
-    }
-    signals = [
-        sidereon.RtcmMsmSignal(
-            each["satellite"], each["signal"], each["code"], each["phase"], each["lock"], each["half"], each["cnr"],
-            each["rate"] if rates else None,
-        )
-        for each in cells
-    ]  # fmt: skip
-    body = sidereon.RtcmMsmMessage(number, system, kind, header, list(satellites.values()), signals)
-    return sidereon.RtcmMessage.from_msm(body).to_frame()
 
 
 def gps_ephemeris(week: int, toe_tow_s: int, satellite: int = 5) -> bytes:
@@ -575,10 +543,7 @@ def test_streams_are_told_by_their_content(tmp_path: Path, data_dir: Path) -> No
 def test_a_rinex_file_sent_as_rtcm_comes_back(tmp_path: Path, data_dir: Path) -> None:
     """A recorded RINEX file, encoded as MSM7: back within half a step of the message, with its time and its gaps."""
     source = read_observations(data_dir / "static_pair_L1L5_2024/base.obs.gz")
-    frames = []
-    for row in range(20):
-        for letter, number in (("G", 1077), ("E", 1097)):
-            frames.append(msm(round(1000 * source.tow_s[row]), list(_cells(source, row, letter)), number=number))
+    frames = frames_of(source, range(20))
     stream = read(tmp_path, frames, gps_week=gps_from_calendar(2024, 6, 24)[0])
     np.testing.assert_array_equal(stream.keys, source.keys[:20])
     there = np.isfinite(source.code_m[:20, L1]) & np.isfinite(source.carrier_m[:20, L1])
@@ -591,23 +556,3 @@ def test_a_rinex_file_sent_as_rtcm_comes_back(tmp_path: Path, data_dir: Path) ->
         moved = carrier[:, satellite][there[:, satellite]]
         assert np.ptp(moved) <= phase_step_m + 2e-8
     assert np.abs(stream.cn0_dbhz - source.cn0_dbhz[:20])[:, L1][there].max() <= 2**-5 + 1e-9
-
-
-def _cells(source: ObservationFile, row: int, letter: str) -> Iterable[dict[str, Any]]:
-    """The L1 observations of a system and an epoch, in the integers of MSM7 (the encoder's part of the round trip)."""
-    for satellite, name in enumerate(SAT_IDS):
-        code_m, carrier_m = source.code_m[row, L1, satellite], source.carrier_m[row, L1, satellite]
-        if name[0] != letter or not math.isfinite(code_m) or not math.isfinite(carrier_m):
-            continue
-        start = int(
-            np.flatnonzero(
-                np.isfinite(source.code_m[:, L1, satellite]) & np.isfinite(source.carrier_m[:, L1, satellite])
-            )[0]
-        )
-        ahead_m = source.code_m[start, L1, satellite] - source.carrier_m[start, L1, satellite]
-        phase_m = carrier_m + round(ahead_m / WAVELENGTH_M[L1]) * WAVELENGTH_M[L1]
-        rough = round(code_m / float(MS_M) * 1024)
-        code = round((code_m / float(MS_M) - rough / 1024) * 2**29)
-        phase = round((phase_m / float(MS_M) - rough / 1024) * 2**31)
-        cnr = round(source.cn0_dbhz[row, L1, satellite] * 16)
-        yield cell(int(name[1:]), 2, whole=rough // 1024, part=rough % 1024, code=code, phase=phase, cnr=cnr, lock=600)
