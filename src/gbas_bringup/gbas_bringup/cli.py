@@ -251,7 +251,7 @@ def process(
     nav: Annotated[list[Path], typer.Option(metavar="N [N2 ...]", help="Navigation files.")],
     ground_xyz: Annotated[
         list[str] | None,
-        typer.Option(metavar="X,Y,Z [...]", help="Antennas of the receivers, ECEF [m] (default: from the headers)."),
+        typer.Option(metavar="X,Y,Z [...]", help="Antennas of the receivers, ECEF [m] (default: from the files)."),
     ] = None,
     user_nav: Annotated[list[Path] | None, typer.Option(metavar="N [N2 ...]", help="The user's, if others.")] = None,
     gps_week: Annotated[
