@@ -252,9 +252,12 @@ def process(
     nav: Annotated[list[Path], typer.Option(metavar="N [N2 ...]", help="Navigation files.")],
     ground_xyz: Annotated[
         list[str] | None,
-        typer.Option(metavar="X,Y,Z [...]", help="Antennas of the receivers, ECEF [m] (default: from the headers)."),
+        typer.Option(metavar="X,Y,Z [...]", help="Antennas of the receivers, ECEF [m] (default: from the files)."),
     ] = None,
     user_nav: Annotated[list[Path] | None, typer.Option(metavar="N [N2 ...]", help="The user's, if others.")] = None,
+    gps_week: Annotated[
+        int | None, typer.Option(metavar="WEEK", help="GPS week in which RTCM 3 streams without ephemerides begin.")
+    ] = None,
     service: Annotated[str, typer.Option(metavar="C", help="Approach service type.")] = "C",
     systems: Annotated[str, typer.Option(metavar="G|E|GE", help="GPS, Galileo, or both.")] = "G",
     fas: Annotated[Path | None, typer.Option(metavar="fas.yaml", help="Final approach; none: north heading.")] = None,
@@ -263,7 +266,7 @@ def process(
     out: Annotated[Path | None, typer.Option(help="Folder for the results (default: out/process-N).")] = None,
     as_json: Json = False,
 ) -> None:
-    """Put recorded RINEX through the whole chain, offline; write solution.csv and summary.json."""
+    """Put recorded RINEX or RTCM 3 through the whole chain, offline; write solution.csv and summary.json."""
     from gbas_bringup import process as body
     from gbas_bringup.progress import progress
 
@@ -273,6 +276,7 @@ def process(
         navigation=tuple(nav),
         ground_xyz_m=tuple(position_of(each) for each in ground_xyz or ()),
         user_navigation=tuple(user_nav or ()),
+        gps_week=gps_week,
         service=service,
         systems=systems,
         station=station,

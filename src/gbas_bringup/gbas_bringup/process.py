@@ -34,13 +34,15 @@ class ProcessRequest:
     Attributes
     ----------
     ground : tuple of Path
-        Observation files of one to four reference receivers.
+        Observation files of one to four reference receivers: RINEX or recorded RTCM 3, like all files here.
     ground_xyz_m : tuple of (x, y, z)
         Their antenna positions, ECEF [m]; empty takes the approximate positions of the file headers, and says so.
     user : Path
         Observation file of the user.
     navigation, user_navigation : tuple of Path
         Navigation files; the user's own only when they differ.
+    gps_week : int or None
+        GPS week of the first epoch of RTCM 3 streams; None where they have ephemerides that say it.
     service : str
         Service type, ``"C"``.
     systems : str
@@ -54,6 +56,7 @@ class ProcessRequest:
     navigation: tuple[Path, ...]
     ground_xyz_m: tuple[tuple[float, float, float], ...] = ()
     user_navigation: tuple[Path, ...] = ()
+    gps_week: int | None = None
     service: str = "C"
     systems: str = "G"
     station: Path | None = None
@@ -128,7 +131,7 @@ def prepare(request: ProcessRequest) -> Prepared:
 
     Raises
     ------
-    RinexError, RecordingError, GbasError, ValueError
+    RinexError, RtcmError, RecordingError, GbasError, ValueError
         With one line that names what cannot be used.
     """
     if request.ground_xyz_m and len(request.ground_xyz_m) != len(request.ground):
@@ -137,7 +140,11 @@ def prepare(request: ProcessRequest) -> Prepared:
             "expected one each"
         )
     recording = Recording.open(
-        request.ground, request.user, request.navigation, user_navigation=request.user_navigation
+        request.ground,
+        request.user,
+        request.navigation,
+        user_navigation=request.user_navigation,
+        gps_week=request.gps_week,
     )
     notes = list(recording.notes())
     ground_source, sections = _ground_sections(request, recording, notes)
@@ -226,7 +233,7 @@ def _document(path: Path) -> Any:
 
 def _run_file(request: ProcessRequest, ground: Mapping[str, Any], airborne: Mapping[str, Any]) -> dict[str, Any]:
     """ROS parameter file of the same run through live nodes."""
-    replay = {
+    replay: dict[str, Any] = {
         "ground_files": [str(path.resolve()) for path in request.ground],
         "user_file": str(request.user.resolve()),
         "nav_files": [str(path.resolve()) for path in request.navigation],
@@ -234,6 +241,8 @@ def _run_file(request: ProcessRequest, ground: Mapping[str, Any], airborne: Mapp
     }
     if request.user_navigation:
         replay["user_nav_files"] = [str(path.resolve()) for path in request.user_navigation]
+    if request.gps_week is not None:
+        replay["gps_week"] = request.gps_week
     sections = {name: values for name, values in ground.items() if values}
     return {
         "/**": {"ros__parameters": {"ground": sections, "airborne": dict(airborne)}},
@@ -281,9 +290,10 @@ def _header_positions(recording: Recording, notes: list[str]) -> tuple[tuple[flo
     for file in recording.ground:
         if file.approx_position_m is None:
             raise GbasError(
-                f"{file.path}: header has no APPROX POSITION XYZ; give the antenna position with --ground-xyz"
+                f"{file.path}: has no antenna position (APPROX POSITION XYZ in RINEX, message 1005 or 1006 in RTCM 3); "
+                "give it with --ground-xyz"
             )
-        notes.append(f"{file.path.name}: antenna position taken from the header, where it may be approximate")
+        notes.append(f"{file.path.name}: antenna position taken from the file, where it may be approximate")
         x, y, z = (float(value) for value in file.approx_position_m)
         positions.append((x, y, z))
     return tuple(positions)

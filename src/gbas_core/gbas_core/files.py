@@ -36,6 +36,21 @@ def read_bytes(path: Path, notes: list[str], error_type: type[GnssFileError]) ->
     return _decompressed(path, data, notes, error_type)
 
 
+def read_start(path: Path, size: int) -> bytes:
+    """The first bytes of a file, decompressed: at most `size`, none of one that cannot be read."""
+    try:
+        with path.open("rb") as file:
+            start = file.read(size)
+    except OSError:
+        return b""
+    if not start.startswith(_GZIP_MAGIC):
+        return start
+    try:
+        return zlib.decompressobj(wbits=31).decompress(start, size)
+    except zlib.error:
+        return b""
+
+
 def _decompressed(path: Path, data: bytes, notes: list[str], error_type: type[GnssFileError]) -> bytes:
     if data.startswith(_COMPRESS_MAGIC):
         raise error_type(path, "compressed with Unix compress (.Z); expected plain text or gzip")

@@ -16,6 +16,7 @@ from gbas_core.ephemeris import Ephemeris
 from gbas_core.gpstime import calendar_text, from_epoch_key
 from gbas_core.observations import ObservationEpoch
 from gbas_core.rinex import NavigationFile, ObservationFile, read_navigation, read_observations
+from gbas_core.rtcm import is_rtcm, read_rtcm, read_rtcm_navigation
 
 
 class RecordingError(ValueError):
@@ -68,20 +69,30 @@ class Recording:
         *,
         user_navigation: Sequence[str | Path] = (),
         galileo: str = "inav",
+        gps_week: int | None = None,
     ) -> Recording:
-        """Read the files.
+        """Read the files: RINEX or recorded RTCM 3, by their content.
+
+        Parameters
+        ----------
+        ground, user, navigation, user_navigation
+            Files; no user is a station alone, no navigation of the user is the station's.
+        galileo : {"inav", "fnav"}
+            Preferred Galileo navigation message.
+        gps_week : int or None
+            GPS week of the first epoch of RTCM 3 streams; None where they have ephemerides that say it.
 
         Raises
         ------
-        RinexError
+        RinexError, RtcmError
             When a file cannot be used.
         RecordingError
-            When the files do not go together: no epoch in common, or navigation of another time.
+            When the files do not go together: no epoch in common, or navigation of another time or of two formats.
         """
-        files = tuple(read_observations(path) for path in ground)
-        user_file = None if user is None else read_observations(user)
-        own = read_navigation(navigation, galileo=galileo)
-        theirs = read_navigation(user_navigation, galileo=galileo) if user_navigation else own
+        files = tuple(_read_observations(path, gps_week) for path in ground)
+        user_file = None if user is None else _read_observations(user, gps_week)
+        own = _read_navigation(navigation, galileo, gps_week)
+        theirs = _read_navigation(user_navigation, galileo, gps_week) if user_navigation else own
         recording = cls(ground=files, user=user_file, navigation=own, user_navigation=theirs)
         recording._check()
         return recording
@@ -144,6 +155,20 @@ class Recording:
                         f"{file.path} ({_span(file)}) and {self.user.path} ({_span(self.user)}) "
                         "have no epoch in common; expected recordings of the same time"
                     )
+
+
+def _read_observations(path: str | Path, gps_week: int | None) -> ObservationFile:
+    return read_rtcm(path, gps_week=gps_week) if is_rtcm(path) else read_observations(path)
+
+
+def _read_navigation(paths: Sequence[str | Path], galileo: str, gps_week: int | None) -> NavigationFile:
+    streams = [path for path in paths if is_rtcm(path)]
+    if not streams:
+        return read_navigation(paths, galileo=galileo)
+    if len(streams) < len(paths):
+        names = ", ".join(map(str, streams))
+        raise RecordingError(f"navigation: {names} is RTCM 3 and the rest is not; expected files of one format")
+    return read_rtcm_navigation(paths, galileo=galileo, gps_week=gps_week)
 
 
 def _observed(file: ObservationFile, row: int | None) -> ObservationEpoch | None:

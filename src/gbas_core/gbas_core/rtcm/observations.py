@@ -31,8 +31,6 @@ from gbas_core.tracking import (
 )
 
 _METRES_PER_MILLISECOND: Final = SPEED_OF_LIGHT_MPS / 1000.0
-_ROUGH_RATE_INVALID: Final = sidereon.RTCM_MSM_ROUGH_PHASE_RANGE_RATE_INVALID
-_FINE_RATE_INVALID: Final = sidereon.RTCM_MSM_FINE_PHASE_RANGE_RATE_INVALID
 _FINE_RATE_STEP_MPS: Final = 1e-4
 _LOSS_OF_LOCK: Final = sidereon.RTCM_LLI_LOSS_OF_LOCK
 _COORDINATES_AGREE_M: Final = 1e-3
@@ -223,7 +221,7 @@ class _Cells:
             if lli is None or place is None or satellite is None:
                 continue
             code_ms = _sum(rough_ms, signal.fine_pseudorange, resolution.code_invalid, resolution.code_ms)
-            rate_mps = _sum(rough_mps, signal.fine_phase_range_rate, _FINE_RATE_INVALID, _FINE_RATE_STEP_MPS)
+            rate_mps = _sum(rough_mps, signal.fine_phase_range_rate, None, _FINE_RATE_STEP_MPS)
             cn0_dbhz = signal.cnr * resolution.cn0_dbhz if signal.cnr else np.nan
             self.rows.append((len(self.keys) - 1, satellite, place, code_ms, phase_ms, rate_mps, cn0_dbhz, lli))
 
@@ -274,13 +272,16 @@ class _Cells:
 
 
 def _rough(satellite: Any) -> tuple[float, float]:
-    """Rough range [ms] and rough rate [m/s] of a satellite; NaN if invalid or not in the message."""
+    """Rough range [ms] and rough rate [m/s] of a satellite; NaN if invalid or not in the message.
+
+    The parser gives ranges as they were sent, with the values that mark them as invalid, and such rates as None.
+    """
     whole, rate = satellite.rough_range_ms, satellite.rough_phase_range_rate_m_s
     invalid = whole is None or whole == sidereon.RTCM_MSM_ROUGH_RANGE_INVALID
     range_ms = np.nan if invalid else whole + satellite.rough_range_mod1 / 1024.0
-    return range_ms, np.nan if rate is None or rate == _ROUGH_RATE_INVALID else float(rate)
+    return range_ms, np.nan if rate is None else float(rate)
 
 
-def _sum(rough: float, fine: int | None, invalid: int, step: float) -> float:
-    """Rough and fine part together: exact, since both are multiples of a power of two; NaN if one is invalid."""
+def _sum(rough: float, fine: int | None, invalid: int | None, step: float) -> float:
+    """Rough and fine part together (of ranges exactly: they are multiples of 2^-31 ms); NaN if one is invalid."""
     return np.nan if fine is None or fine == invalid else rough + fine * step

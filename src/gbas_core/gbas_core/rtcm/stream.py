@@ -14,12 +14,13 @@ from typing import Any, Final
 
 import sidereon
 
-from gbas_core.files import GnssFileError, read_bytes
+from gbas_core.files import GnssFileError, read_bytes, read_start
 from gbas_core.gpstime import MILLISECONDS_PER_WEEK, SECONDS_PER_WEEK
 from gbas_core.rtcm.ephemeris_fields import LONGEST_VALIDITY_S, RawEphemeris
 
 _PREAMBLE: Final = b"\xd3"
 _LONGEST_FRAME: Final = 1029
+_FRAMES_LOOKED_AT: Final = 64
 _SYSTEMS: Final = ("G", "E")
 _HALF_WEEK_MS: Final = MILLISECONDS_PER_WEEK // 2
 
@@ -31,12 +32,10 @@ class RtcmError(GnssFileError):
 def is_rtcm(path: str | Path) -> bool:
     """Whether a file is a recorded RTCM 3 stream: by its content, since such files have names of all kinds.
 
-    True when its beginning (64 frames) holds a frame with a correct checksum. A file that cannot be read is not one.
+    True when its beginning (64 of the longest frames) holds a frame with a correct checksum. A file that cannot be read
+    is none.
     """
-    try:
-        start = read_bytes(Path(path), [], RtcmError)[: 64 * _LONGEST_FRAME]
-    except RtcmError:
-        return False
+    start = read_start(Path(path), _FRAMES_LOOKED_AT * _LONGEST_FRAME)
     return _PREAMBLE in start and bool(sidereon.decode_rtcm_stream(start).messages)
 
 

@@ -25,7 +25,7 @@ class ReceiverReplayParams(DriverParams):
     Attributes
     ----------
     ground_files : tuple of str
-        Observation files of one to four reference receivers, rr1 first.
+        Observation files of one to four reference receivers, rr1 first: RINEX or recorded RTCM 3, like all files here.
     user_file : str
         Observation file of the aircraft; none for a station alone.
     nav_files : tuple of str
@@ -34,6 +34,8 @@ class ReceiverReplayParams(DriverParams):
         Navigation files of the aircraft where they differ; they go to ``airborne/ephemeris``.
     galileo : str
         Preferred Galileo navigation message, ``"inav"`` or ``"fnav"``.
+    gps_week : int
+        GPS week of the first epoch of RTCM 3 streams; -1 where they have ephemerides that say it.
     systems : str
         Satellite systems that are sent.
     start_s, stop_s : float
@@ -45,6 +47,7 @@ class ReceiverReplayParams(DriverParams):
     nav_files: tuple[str, ...] = ()
     user_nav_files: tuple[str, ...] = ()
     galileo: str = "inav"
+    gps_week: int = -1
     systems: str = "GE"
     start_s: float = -1.0
     stop_s: float = -1.0
@@ -55,6 +58,7 @@ class ReceiverReplayParams(DriverParams):
         require("ground_files", self.ground_files, 1 <= count <= MAX_REFERENCE_RECEIVERS, "1 to 4 files")
         require("nav_files", self.nav_files, bool(self.nav_files), "1 or more files")
         require("galileo", self.galileo, self.galileo in ("inav", "fnav"), "inav or fnav")
+        require("gps_week", self.gps_week, self.gps_week >= -1, "-1 or a GPS week")
         known = bool(self.systems) and set(self.systems) <= set(SYSTEM_MASKS)
         require("systems", self.systems, known, f"letters of {''.join(SYSTEM_MASKS)}")
         later = self.stop_s < 0.0 or self.stop_s >= self.start_s
@@ -70,6 +74,7 @@ class ReceiverReplay(DriverNode[RecordedEpoch]):
         self.recording = Recording.open(
             files.ground_files, files.user_file or None, files.nav_files,
             user_navigation=files.user_nav_files, galileo=files.galileo,
+            gps_week=None if files.gps_week < 0 else files.gps_week,
         )  # fmt: skip
         self.unused = ~satellites_of(files.systems)
         self.feeds = [EphemerisFeed(self, topics.EPHEMERIS, self.recording.ephemerides())]
