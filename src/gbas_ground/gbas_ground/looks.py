@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gbas_core.record import FloatArray
 from gbas_core.satellites import N_SATS, missing
@@ -13,7 +14,7 @@ from gbas_ground.corrections import BoolArray
 from gbas_ground.monitors.result import MonitorResult
 from gbas_msgs_py.records import GROUND_MONITORS, MonitorEpoch, MonitorState
 
-_EACH: Final = np.arange(N_SATS)
+IntArray = NDArray[np.intp]
 
 
 class Look(NamedTuple):
@@ -22,6 +23,33 @@ class Look(NamedTuple):
     statistic: FloatArray
     threshold: FloatArray
     state: FloatArray
+
+
+def place_of_worst(result: MonitorResult, *, axes: int) -> tuple[IntArray, ...]:
+    """Where along the first `axes` axes the statistic is furthest over its threshold, or nearest to it.
+
+    Returns
+    -------
+    tuple of int arrays
+        One index an axis, each of the shape of the remaining axes; 0 where there is no statistic.
+    """
+    shape = result.statistic.shape
+    excess = (result.statistic - result.threshold) / np.abs(result.threshold)  # thresholds may be negative
+    flat = excess.reshape(-1, *shape[axes:])
+    place = np.where(np.isnan(flat), -np.inf, flat).argmax(axis=0)
+    return np.unravel_index(place, shape[:axes])
+
+
+def worst_of(result: MonitorResult, *, axes: int) -> MonitorResult:
+    """Statistic and threshold at :func:`place_of_worst`; failed where any along these axes did."""
+    shape = result.statistic.shape
+    rest = np.indices(shape[axes:], sparse=True)
+    place = (*place_of_worst(result, axes=axes), *rest)
+    return MonitorResult(
+        statistic=result.statistic[place],
+        threshold=np.broadcast_to(result.threshold, shape)[place],
+        failed=np.logical_or.reduce(result.failed.reshape(-1, *shape[axes:])),
+    )
 
 
 def look(result: MonitorResult, due: BoolArray) -> Look:
@@ -39,23 +67,16 @@ def look(result: MonitorResult, due: BoolArray) -> Look:
     Look
         Statistic and threshold are those of the test that is furthest over its threshold, or nearest to it.
     """
-    threshold = np.broadcast_to(result.threshold, result.statistic.shape)
-    statistic, failed, expected = result.statistic, result.failed, due
-    if statistic.ndim > 1:
-        statistic, threshold = statistic.reshape(-1, N_SATS), threshold.reshape(-1, N_SATS)
-        excess = (statistic - threshold) / np.abs(threshold)
-        worst = np.where(np.isnan(excess), -np.inf, excess).argmax(axis=0)
-        statistic, threshold = statistic[worst, _EACH], threshold[worst, _EACH]
-        failed = np.logical_or.reduce(failed.reshape(-1, N_SATS))
-    if due.ndim > 1:
-        expected = np.logical_or.reduce(due.reshape(-1, N_SATS))
-    looked = np.isfinite(statistic + threshold)
+    axes = result.statistic.ndim - 1
+    worst = worst_of(result, axes=axes) if axes else result
+    expected = due if due.ndim == 1 else np.logical_or.reduce(due.reshape(-1, N_SATS))
+    looked = np.isfinite(worst.statistic + worst.threshold)
     seen = np.where(looked, float(MonitorState.PASSED), float(MonitorState.NOT_MONITORED))
     state = np.where(expected, seen, float(MonitorState.NOT_DUE))
     return Look(
-        statistic=np.where(looked, statistic, np.nan),
-        threshold=np.where(looked, threshold, np.nan),
-        state=np.where(failed, float(MonitorState.FAILED), state),
+        statistic=np.where(looked, worst.statistic, np.nan),
+        threshold=np.where(looked, worst.threshold, np.nan),
+        state=np.where(worst.failed, float(MonitorState.FAILED), state),
     )
 
 

@@ -19,13 +19,18 @@ from gbas_ground.monitors.carrier_acceleration import STATISTICS, CarrierAcceler
 from gbas_ground.monitors.carrier_noise import CarrierNoise
 from gbas_ground.monitors.code_carrier_divergence import CcdParams
 from gbas_ground.monitors.divergence_covariance import Matrix3, StatisticCovariance
+from gbas_ground.monitors.ephemeris_residual import EphemerisResidualParams
 from gbas_ground.monitors.false_alarm import FALSE_EXCLUSION
 from gbas_ground.monitors.ionosphere_gradient import IonosphereGradientParams
+from gbas_ground.monitors.power_expectation import PowerExpectationParams
+from gbas_ground.monitors.sigma_monitor import SigmaMonitorParams
 from gbas_ground.monitors.two_frequency_divergence import TwoFrequencyParams
 from gbas_msgs_py.parameters import ParameterError
 
 _DEGREE: Final = math.pi / 180.0
 _PROBABILITY: Final = {"low": 1e-12, "high": 0.1}
+FALSE_EXCLUSION_OF_ALL: Final = 2e-7
+"""Budget of false exclusions of one source in 15 s by all monitors together. Known: a twentieth of it for each."""
 _TRIANGLE: Final = 6
 _UPPER: Final = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 
@@ -161,6 +166,109 @@ class AccelerationSection(Declared):
 
 
 @dataclass(frozen=True, kw_only=True)
+class PowerSection(Declared):
+    """C/N0 against what is expected at the elevation."""
+
+    exclude: bool = parameter("power", "exclude", True, "-", "satellites and channels that fail are excluded")
+    elevation_rad: tuple[float, ...] = parameter(
+        "power", "elevation_deg", PowerExpectationParams.elevation_rad, "deg", "nodes of the table, rising",
+        low=0.0, high=90.0, per_unit=_DEGREE,
+    )  # fmt: skip
+    minimum_l1_dbhz: tuple[float, ...] = parameter(
+        "power", "minimum_l1_dbhz", PowerExpectationParams.minimum_dbhz[0], "dB-Hz", "at the nodes", low=0.0, high=70.0
+    )
+    minimum_l2_dbhz: tuple[float, ...] = parameter(
+        "power", "minimum_l2_dbhz", PowerExpectationParams.minimum_dbhz[1], "dB-Hz", "at the nodes", low=0.0, high=70.0
+    )
+    minimum_l5_dbhz: tuple[float, ...] = parameter(
+        "power", "minimum_l5_dbhz", PowerExpectationParams.minimum_dbhz[2], "dB-Hz", "at the nodes", low=0.0, high=70.0
+    )
+    channel_margin_db: float = parameter(
+        "power", "channel_margin_db", 4.0, "dB", "a single channel may be this much lower", low=0.0, high=40.0
+    )
+    average_s: float = parameter("power", "average_s", 1.5, "s", "time constant of the average", low=0.1, high=600.0)
+    learn: bool = parameter("power", "learn", False, "-", "let what the receivers saw raise the minimum")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        try:
+            self.params(1.0)
+        except ValueError as error:
+            raise ParameterError(str(error)) from None
+
+    def params(self, max_gap_s: float) -> PowerExpectationParams:
+        """Parameters of the monitor."""
+        return PowerExpectationParams(
+            elevation_rad=self.elevation_rad,
+            minimum_dbhz=(self.minimum_l1_dbhz, self.minimum_l2_dbhz, self.minimum_l5_dbhz),
+            channel_margin_db=self.channel_margin_db,
+            average_s=self.average_s,
+            learn=self.learn,
+            max_gap_s=max_gap_s,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class SigmaSection(Declared):
+    """Mean and spread of the B values over time."""
+
+    exclude: bool = parameter("sigma_monitor", "exclude", True, "-", "channels and receivers that fail are excluded")
+    window_s: tuple[float, ...] = parameter(
+        "sigma_monitor", "window_s", SigmaMonitorParams.window_s, "s", "time constants", low=60.0, high=86_400.0
+    )
+    correlation_s: tuple[float, float] = parameter(
+        "sigma_monitor", "correlation_s", SigmaMonitorParams.correlation_s, "s",
+        "correlation time of the B values of each smoothing constant", low=1.0, high=3600.0,
+    )  # fmt: skip
+    sample_s: float = parameter(
+        "sigma_monitor", "sample_s", SigmaMonitorParams.sample_s, "s", "between the values taken", low=0.5, high=600.0
+    )
+    p_false_alarm: float = parameter(
+        "sigma_monitor", "p_false_alarm", FALSE_EXCLUSION, "-", "of one source in 15 s", **_PROBABILITY
+    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if len(self.correlation_s) != 2:
+            raise ParameterError(f"sigma_monitor.correlation_s = {self.correlation_s} is not 2 numbers")
+        try:
+            self.params()
+        except ValueError as error:
+            raise ParameterError(str(error)) from None
+
+    def params(self) -> SigmaMonitorParams:
+        """Parameters of the monitor."""
+        return SigmaMonitorParams(
+            window_s=self.window_s,
+            correlation_s=self.correlation_s,
+            sample_s=self.sample_s,
+            p_false_alarm=self.p_false_alarm,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class EphemerisSection(Declared):
+    """Broadcast orbits against double-difference carriers."""
+
+    exclude: bool = parameter("ephemeris_residual", "exclude", True, "-", "satellites that fail are excluded")
+    p_false_alarm: float = parameter(
+        "ephemeris_residual", "p_false_alarm", FALSE_EXCLUSION, "-", "of one source in 15 s", **_PROBABILITY
+    )
+    p_missed_detection: float = parameter(
+        "ephemeris_residual", "p_missed_detection", 1e-4, "-", "of an orbit error P is claimed for", **_PROBABILITY
+    )
+
+    def params(self, bands: tuple[int, ...]) -> EphemerisResidualParams:
+        """Parameters of the monitor; its double differences are those of the gradient monitor."""
+        return EphemerisResidualParams(
+            bands=bands,
+            p_false_alarm=self.p_false_alarm,
+            p_missed_detection=self.p_missed_detection,
+            required=False,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
 class CarrierNoiseSection(Declared):
     """Noise and multipath of one reference receiver's carriers."""
 
@@ -251,3 +359,18 @@ class MonitorParams(Declared):
     ccd_f: TwoFrequencySection = nested(TwoFrequencySection())
     acceleration: AccelerationSection = nested(AccelerationSection())
     gradient: GradientSection = nested(GradientSection())
+    ephemeris: EphemerisSection = nested(EphemerisSection())
+    power: PowerSection = nested(PowerSection())
+    sigma: SigmaSection = nested(SigmaSection())
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        shares = {
+            "gradient": self.gradient.p_false_alarm,
+            "acceleration": self.acceleration.p_false_alarm,
+            "ephemeris_residual": self.ephemeris.p_false_alarm,
+            "sigma_monitor": self.sigma.p_false_alarm,
+        }
+        if sum(shares.values()) > FALSE_EXCLUSION_OF_ALL:
+            given = ", ".join(f"{name}.p_false_alarm = {share:g}" for name, share in shares.items())
+            raise ParameterError(f"{given} are together more than the budget of {FALSE_EXCLUSION_OF_ALL:g} in 15 s")

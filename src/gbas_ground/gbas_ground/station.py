@@ -40,9 +40,11 @@ from gbas_ground.ephemerides import EphemerisState, initial_ephemerides
 from gbas_ground.event_log import EventLog
 from gbas_ground.executive import advance, exclude, release
 from gbas_ground.geometry import Expected, Site, expected, site_of
+from gbas_ground.long_term import initial_long_term, watch_sigmas
 from gbas_ground.looks import look, monitor_epoch
 from gbas_ground.monitors.expected_range import check_expected_range
 from gbas_ground.monitors.result import MonitorResult
+from gbas_ground.monitors.sigma_monitor import SigmaMonitorState
 from gbas_ground.monitors.signal_power import check_signal_power
 from gbas_ground.params import GroundParams
 from gbas_ground.surveillance import Seen, Watched, WatchState, initial_watch, watch
@@ -142,6 +144,8 @@ class MonitorState:
         The executive's table of the last epoch.
     watching : WatchState
         Monitors of signals.
+    long_term : SigmaMonitorState
+        Monitor of B values over time.
     """
 
     key: int | None
@@ -158,6 +162,7 @@ class MonitorState:
     serving: bool
     channels: ChannelEpoch | None
     watching: WatchState
+    long_term: SigmaMonitorState
 
 
 def initial_monitor_state(params: GroundParams) -> MonitorState:
@@ -177,6 +182,7 @@ def initial_monitor_state(params: GroundParams) -> MonitorState:
         serving=False,
         channels=None,
         watching=initial_watch(params),
+        long_term=initial_long_term(params),
     )
 
 
@@ -320,7 +326,8 @@ def _process(
         elevation_rad=should.elevation_rad,
     )
     made, new_exclusions, findings = agree(measured, new_exclusions, params)
-    findings = (*noticed, *findings)
+    long_term, new_exclusions, slow, slow_looks = watch_sigmas(state.long_term, made, new_exclusions, dt_s, params)
+    findings = (*noticed, *findings, *slow)
     events.found(findings)
     new_exclusions = _advanced(
         new_exclusions, measured, made, channel_ok, watched.passed, dt_s, params
@@ -357,9 +364,10 @@ def _process(
         serving=serving,
         channels=channels,
         watching=watching,
+        long_term=long_term,
     )
     looks = {name: look(result, tracked) for name, (_, result) in zip(("range", "power"), checks, strict=True)}
-    looks |= {**watched.looks, **consistency_looks(made, params)}
+    looks |= {**watched.looks, **consistency_looks(made, params), **slow_looks}
     statistics = monitor_epoch(epoch.gps_week, epoch.tow_s, looks, watched.details, np.isfinite(integrity.state))
     return new, Monitored(integrity=integrity, statistics=statistics, channels=channels, events=events.all())
 
@@ -475,13 +483,15 @@ def _seen(
     params: GroundParams,
 ) -> Seen:
     """What the monitors of signals are given."""
-    ready = channel_ok & exclusions.usable_channels() & settled
+    usable = channel_ok & exclusions.usable_channels()
+    ready = usable & settled
     due = (ready.sum(axis=0) >= params.min_receivers) & np.isfinite(known.crc)
     return Seen(
         code_m=raw.code_m,
         carrier_m=tracks.carrier_m,
         cn0_dbhz=raw.cn0_dbhz,
         slipped=tracks.slipped,
+        usable=usable & ~exclusions.satellites.excluded,
         ready=ready,
         due=due,
         may_refer=due & ~exclusions.satellites.excluded,

@@ -13,7 +13,6 @@ from functools import lru_cache
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gbas_core.divergence import DivergenceState
 from gbas_core.record import FloatArray
@@ -22,7 +21,7 @@ from gbas_core.signals import L1, L5, N_BANDS
 from gbas_ground.causes import ExclusionCause
 from gbas_ground.corrections import BoolArray
 from gbas_ground.geometry import Expected
-from gbas_ground.looks import Look, look
+from gbas_ground.looks import Look, look, place_of_worst, worst_of
 from gbas_ground.monitors.carrier_acceleration import (
     CarrierAccelerationParams,
     CarrierAccelerationResult,
@@ -39,12 +38,24 @@ from gbas_ground.monitors.double_difference import (
     double_differences,
     reference_satellites,
 )
+from gbas_ground.monitors.ephemeris_residual import (
+    EphemerisResidualParams,
+    EphemerisResidualState,
+    ephemeris_residual_step,
+    initial_ephemeris_residual,
+)
 from gbas_ground.monitors.ionosphere_gradient import (
     GradientResult,
     GradientSite,
     IonosphereGradientParams,
     check_ionosphere_gradient,
     gradient_site,
+)
+from gbas_ground.monitors.power_expectation import (
+    PowerExpectationParams,
+    PowerExpectationState,
+    initial_power_expectation,
+    power_expectation_step,
 )
 from gbas_ground.monitors.result import MonitorResult
 from gbas_ground.monitors.two_frequency_divergence import (
@@ -75,8 +86,10 @@ class Seen(NamedTuple):
         Of all channels that were measured; NaN where not.
     slipped : (R, N_BANDS, N) bool array
         Where a carrier and the one before do not belong together.
+    usable : (R, N) bool array
+        Channels that are tracked and that nothing excludes, nor their satellite.
     ready : (R, N) bool array
-        Channels whose smoothing filter has settled and that nothing excludes.
+        Channels whose smoothing filter has settled, and whose receiver is not excluded either.
     due : (N,) bool array
         Satellites that would be broadcast if nothing else were against it.
     may_refer : (N,) bool array
@@ -94,6 +107,7 @@ class Seen(NamedTuple):
     carrier_m: FloatArray
     cn0_dbhz: FloatArray
     slipped: BoolArray
+    usable: BoolArray
     ready: BoolArray
     due: BoolArray
     may_refer: BoolArray
@@ -110,6 +124,8 @@ class WatchState:
     ccd: DivergenceState
     ccd_f: TwoFrequencyState
     acceleration: CarrierAccelerationState
+    ephemeris: EphemerisResidualState
+    power: PowerExpectationState
 
 
 class Verdict(NamedTuple):
@@ -176,6 +192,8 @@ class _Settings(NamedTuple):
     acceleration: CarrierAccelerationParams
     gradient: IonosphereGradientParams
     gradient_required: bool
+    ephemeris: EphemerisResidualParams
+    power: PowerExpectationParams
     site: GradientSite
     troposphere: Troposphere
 
@@ -192,6 +210,8 @@ def _settings(params: GroundParams) -> _Settings:
         acceleration=sections.acceleration.params(params.max_gap_s),
         gradient=gradient,
         gradient_required=sections.gradient.required or params.gast_d,
+        ephemeris=sections.ephemeris.params(gradient.bands),
+        power=sections.power.params(params.max_gap_s),
         site=gradient_site(params.receiver_positions_m(), params.reference_point_m(), gradient),
         troposphere=Troposphere(refractivity=params.refractivity, scale_height_m=params.scale_height_m),
     )
@@ -204,6 +224,8 @@ def initial_watch(params: GroundParams) -> WatchState:
         ccd=initial_ccd(settings.ccd, count),
         ccd_f=initial_two_frequency(settings.ccd_f, count),
         acceleration=initial_carrier_acceleration(count, settings.acceleration),
+        ephemeris=initial_ephemeris_residual(len(settings.site.baselines), settings.ephemeris),
+        power=initial_power_expectation(count, settings.power),
     )
 
 
@@ -216,8 +238,13 @@ def watch(state: WatchState, seen: Seen, params: GroundParams) -> tuple[WatchSta
     acceleration, carrier = _acceleration(
         state.acceleration, residual_m, seen, settings, exclude=sections.acceleration.exclude
     )
-    gradient = _gradient(residual_m, seen, settings, exclude=sections.gradient.exclude)
-    parts = (divergence, two_frequency, carrier, gradient)
+    differences = _double_differences(residual_m, seen, settings)
+    gradient = _gradient(differences, seen, settings, exclude=sections.gradient.exclude)
+    ephemeris, orbit = _ephemeris(state.ephemeris, differences, seen, settings, exclude=sections.ephemeris.exclude)
+    power, expectation = _power(
+        state.power, seen, settings, exclude=sections.power.exclude, required=params.require_cn0
+    )
+    parts = (divergence, two_frequency, carrier, gradient, orbit, expectation)
     ready = np.ones_like(seen.due)
     for part in parts:
         if part.ready is not None:
@@ -229,7 +256,8 @@ def watch(state: WatchState, seen: Seen, params: GroundParams) -> tuple[WatchSta
         looks={name: each for part in parts for name, each in part.looks.items()},
         details={name: each for part in parts for name, each in part.details.items()},
     )
-    return WatchState(ccd=ccd, ccd_f=ccd_f, acceleration=acceleration), watched
+    state = WatchState(ccd=ccd, ccd_f=ccd_f, acceleration=acceleration, ephemeris=ephemeris, power=power)
+    return state, watched
 
 
 def _ccd(state: DivergenceState, seen: Seen, settings: _Settings, *, exclude: bool) -> tuple[DivergenceState, _Part]:
@@ -257,7 +285,7 @@ def _ccd_f(state: TwoFrequencyState, seen: Seen, settings: _Settings, exclude: s
         rebased=seen.rebased,
         elevation_rad=seen.expected.elevation_rad,
         used=seen.ready,
-        clock_used=seen.ready & seen.may_refer,
+        clock_used=seen.usable,
     )
     state, epoch = two_frequency_step(state, given, seen.dt_s, params)
     forms = {"sound": epoch.sound, "paper": epoch.paper}
@@ -300,7 +328,8 @@ def _acceleration(
     known = np.isfinite(found.satellites.statistic[0, 0])
     each = [_row(found.satellites, number) for number in range(len(_CARRIER_CAUSES))]
     looks = {name: look(result, seen.due) for (name, _), result in zip(_CARRIER_CAUSES, each, strict=True)}
-    number, worst = _worst(found.satellites)
+    worst = worst_of(found.satellites, axes=2)
+    number = place_of_worst(found.satellites, axes=2)[0]
     cause = np.array([cause for _, cause in _CARRIER_CAUSES])[number]
     failed = seen.due & known & found.failed_satellites
     satellites = tuple(Verdict(name, replace(worst, failed=failed & (cause == name))) for _, name in _CARRIER_CAUSES)
@@ -315,24 +344,20 @@ def _acceleration(
 
 def _channels(found: CarrierAccelerationResult) -> MonitorResult:
     """The worst statistic of each channel, ``(R, N)``; one that is missing makes nobody fail, but is not ready."""
-    by_channel = MonitorResult(
-        statistic=np.moveaxis(found.channels.statistic, 1, 2).reshape(-1, *found.failed_channels.shape),
-        threshold=np.moveaxis(np.broadcast_to(found.channels.threshold, found.channels.statistic.shape), 1, 2).reshape(
-            -1, *found.failed_channels.shape
-        ),
-        failed=found.failed_channels,
-    )
-    _, worst = _worst(by_channel, axes=1)
+    worst = worst_of(_moved(found.channels, 2, 1), axes=2)
     return replace(worst, failed=found.failed_channels & (worst.statistic > worst.threshold))
 
 
-def _gradient(residual_m: FloatArray, seen: Seen, settings: _Settings, *, exclude: bool) -> _Part:
-    site, params = settings.site, settings.gradient
-    references = reference_satellites(seen.may_refer, seen.expected.elevation_rad, params.references)
+def _double_differences(residual_m: FloatArray, seen: Seen, settings: _Settings) -> DoubleDifferences:
+    """Of the channels that are ready, over all baselines."""
+    params, elevation_rad = settings.gradient, seen.expected.elevation_rad
+    references = reference_satellites(seen.may_refer, elevation_rad, params.references)
     used_m = np.where(seen.ready[:, np.newaxis], residual_m[:, list(params.bands)], np.nan)
-    differences = double_differences(
-        used_m, site.baselines, references, seen.expected.elevation_rad, params.noise, params.bands
-    )
+    return double_differences(used_m, settings.site.baselines, references, elevation_rad, params.noise, params.bands)
+
+
+def _gradient(differences: DoubleDifferences, seen: Seen, settings: _Settings, *, exclude: bool) -> _Part:
+    site, params = settings.site, settings.gradient
     found = check_ionosphere_gradient(differences, seen.due, site, params)
     due = seen.due & (len(site.baselines) > 0)
     return _Part(
@@ -340,6 +365,38 @@ def _gradient(residual_m: FloatArray, seen: Seen, settings: _Settings, *, exclud
         details=_gradient_details(found, differences, settings),
         satellites=_verdicts(exclude, (ExclusionCause.IONOSPHERE_GRADIENT, found.verdict), due),
         ready=found.monitored if settings.gradient_required else None,
+    )
+
+
+def _ephemeris(
+    state: EphemerisResidualState, differences: DoubleDifferences, seen: Seen, settings: _Settings, *, exclude: bool
+) -> tuple[EphemerisResidualState, _Part]:
+    baselines = settings.site.baselines
+    state, result = ephemeris_residual_step(
+        state, differences, baselines, seen.due, seen.dt_s, settings.ephemeris, shift_m=seen.shift_m
+    )
+    return state, _Part(
+        looks={"ephemeris": look(result, seen.due & (len(baselines) > 0))},
+        satellites=_verdicts(exclude, (ExclusionCause.EPHEMERIS_RESIDUAL, result), seen.due),
+    )
+
+
+def _power(
+    state: PowerExpectationState, seen: Seen, settings: _Settings, *, exclude: bool, required: bool
+) -> tuple[PowerExpectationState, _Part]:
+    """A receiver that gives no C/N0 fails where the station requires it, and is not looked at otherwise."""
+    given = np.isfinite(seen.cn0_dbhz[:, L1])
+    due = seen.ready & seen.due & (given | required)
+    state, found = power_expectation_step(
+        state, seen.cn0_dbhz, due, seen.expected.elevation_rad, seen.dt_s, settings.power
+    )
+    worst = worst_of(found.satellites, axes=1)
+    satellites = replace(worst, failed=np.logical_or.reduce(found.satellites.failed))
+    channels = worst_of(_moved(found.channels, 1, 0), axes=1)
+    return state, _Part(
+        looks={"expected_power": look(satellites, np.logical_or.reduce(due))},
+        satellites=_verdicts(exclude, (ExclusionCause.EXPECTED_POWER, satellites), seen.due),
+        channels=(Verdict(ExclusionCause.EXPECTED_POWER, channels),) if exclude else (),
     )
 
 
@@ -367,22 +424,17 @@ def _verdicts(exclude: bool, verdict: tuple[ExclusionCause, MonitorResult], due:
     return (Verdict(cause, replace(result, failed=result.failed & due)),) if exclude else ()
 
 
+def _moved(result: MonitorResult, source: int, destination: int) -> MonitorResult:
+    """The same with one axis elsewhere."""
+    shape = result.statistic.shape
+    return MonitorResult(
+        statistic=np.moveaxis(result.statistic, source, destination),
+        threshold=np.moveaxis(np.broadcast_to(result.threshold, shape), source, destination),
+        failed=np.moveaxis(np.broadcast_to(result.failed, shape), source, destination),
+    )
+
+
 def _row(result: MonitorResult, row: int) -> MonitorResult:
     """One row of a result's first axis."""
     threshold = np.broadcast_to(result.threshold, result.statistic.shape)
     return MonitorResult(statistic=result.statistic[row], threshold=threshold[row], failed=result.failed[row])
-
-
-def _worst(result: MonitorResult, *, axes: int = 2) -> tuple[NDArray[np.int64], MonitorResult]:
-    """Of the first `axes` axes: place on the first of the statistic furthest over its threshold, and that statistic."""
-    shape = result.statistic.shape
-    statistic = result.statistic.reshape(-1, *shape[axes:])
-    threshold = np.broadcast_to(result.threshold, shape).reshape(-1, *shape[axes:])
-    ratio = statistic / threshold
-    place = np.where(np.isnan(ratio), -1.0, ratio).argmax(axis=0)
-    chosen = MonitorResult(
-        statistic=np.take_along_axis(statistic, place[np.newaxis], axis=0)[0],
-        threshold=np.take_along_axis(threshold, place[np.newaxis], axis=0)[0],
-        failed=np.zeros(shape[axes:], dtype=bool),
-    )
-    return place // int(np.prod(shape[1:axes], initial=1)), chosen

@@ -145,27 +145,34 @@ def _divergence(mode: str, rate_mps: float, satellite: str, onset_s: float) -> t
 
 def acceleration_cases() -> Iterator[Case]:
     """Steps, ramps and accelerations that code and carrier share."""
-    sizes: dict[str, tuple[float, ...]] = {
-        "step_m": (0.02, 0.05, 0.1, 0.5, 1.6, 2.0, 10.0),
-        "ramp_mps": (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0),
-        "acceleration_mps2": (0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 1.0),
-    }
-    units = {"step_m": "m", "ramp_mps": "m/s", "acceleration_mps2": "m/s2"}
-    for place, (key, values) in enumerate(sizes.items()):
+    sizes = (
+        ("step", "m", (0.02, 0.05, 0.1, 0.5, 1.6, 2.0, 10.0)),
+        ("ramp", "m/s", (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0)),
+        ("acceleration", "m/s2", (0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 1.0)),
+    )
+    for place, (name, unit, values) in enumerate(sizes):
         for value in values:
-            grown = [0.0, 0.0, 0.0]
-            grown[place] = value
+            step, ramp, acceleration = (value if place == each else 0.0 for each in range(3))
             yield Case(
                 kind="acceleration",
-                name=f"{key.split('_')[0]} {value:g} {units[key]}",
-                threats=partial(_acceleration, key, value),
-                limit_s=extrapolation_limit_s(*grown),
+                name=f"{name} {value:g} {unit}",
+                threats=partial(_acceleration, step, ramp, acceleration),
+                limit_s=extrapolation_limit_s(step, ramp, acceleration),
                 watch_s=60.0,
             )
 
 
-def _acceleration(key: str, value: float, satellite: str, onset_s: float) -> tuple[Threat, ...]:
-    return (ExcessiveAcceleration(satellite=satellite, start_s=onset_s, **{key: value}),)
+def _acceleration(
+    step_m: float, ramp_mps: float, acceleration_mps2: float, satellite: str, onset_s: float
+) -> tuple[Threat, ...]:
+    fault = ExcessiveAcceleration(
+        satellite=satellite,
+        start_s=onset_s,
+        step_m=step_m,
+        ramp_mps=ramp_mps,
+        acceleration_mps2=acceleration_mps2,
+    )
+    return (fault,)
 
 
 def power_cases() -> Iterator[Case]:
@@ -217,7 +224,8 @@ def run_campaign(
     """
     longest = max((case.watch_s for case in cases), default=0.0)
     if world.length_s < QUIET_S + longest + 1.0:
-        raise ValueError(f"the world is {world.length_s:g} s long, and the longest case needs {QUIET_S + longest + 1:g}")
+        needed_s = QUIET_S + longest + 1.0
+        raise ValueError(f"the world is {world.length_s:g} s long, and the longest case needs {needed_s:g} s")
     acting = settle(world, station, QUIET_S)
     if not acting.usable:
         raise ValueError("the station has no usable satellite after the quiet start")

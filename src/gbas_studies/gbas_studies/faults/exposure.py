@@ -21,7 +21,7 @@ from gbas_studies.ccd.smoothed_error import LONG_BEFORE, Smoothing, smoothed_cmc
 MALFUNCTION_LIMIT_M: Final = 1.6
 IONOSPHERE_LIMIT_M: Final = 2.75
 CORRECTION_AGE_S: Final = 1.5
-"""Oldest correction a user extrapolates while nothing is lost: Z-count to burst 0.5 s, and two frames of 0.5 s. Ours."""
+"""Oldest correction a user extrapolates while nothing is lost: 0.5 s from Z-count to burst, two frames. Ours."""
 TIME_TO_ALERT_S: Final = 1.5
 """Of the ground station, GAST D (known)."""
 _SEARCH_S: Final = 600.0

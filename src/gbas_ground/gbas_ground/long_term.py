@@ -1,0 +1,94 @@
+"""The sigma monitor in the station: B values over minutes and hours against the sigmas that are broadcast.
+
+It looks at corrections that are made already, and what it fails is excluded from the next epoch on: it takes minutes to
+see anything, so half a second more is nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+
+from gbas_core.satellites import SAT_IDS
+from gbas_ground.causes import ExclusionCause
+from gbas_ground.consistency import Corrections, Exclusions, Finding
+from gbas_ground.corrections import BoolArray
+from gbas_ground.executive import exclude
+from gbas_ground.looks import Look, look, worst_of
+from gbas_ground.monitors.result import MonitorResult
+from gbas_ground.monitors.sigma_monitor import (
+    SigmaMonitorParams,
+    SigmaMonitorResult,
+    SigmaMonitorState,
+    initial_sigma_monitor,
+    normalised_b,
+    sigma_monitor_step,
+)
+from gbas_ground.params import GroundParams
+
+
+@lru_cache(maxsize=8)
+def _settings(params: GroundParams) -> SigmaMonitorParams:
+    return params.monitors.sigma.params()
+
+
+def initial_long_term(params: GroundParams) -> SigmaMonitorState:
+    """A monitor that has seen nothing."""
+    return initial_sigma_monitor(params.n_receivers, _settings(params))
+
+
+def watch_sigmas(
+    state: SigmaMonitorState, made: Corrections, exclusions: Exclusions, dt_s: float, params: GroundParams
+) -> tuple[SigmaMonitorState, Exclusions, tuple[Finding, ...], dict[str, Look]]:
+    """Take the B values of one epoch.
+
+    Returns
+    -------
+    state : SigmaMonitorState
+    exclusions : Exclusions
+        With the channels and receivers that fail, from the next epoch on.
+    findings : tuple of Finding
+    looks : dict
+    """
+    settings, used = _settings(params), made.used & (made.count >= 2)
+    # What is excluded has no B values; its old estimates count until they are forgotten.
+    remembered = (state.count > 0.0) & (state.since_s + max(dt_s, 0.0) <= settings.forget_s)
+    due = used | (exclusions.channels.excluded & remembered)
+    normalised = normalised_b(made.b_m, made.channel_sigma_m, used)
+    state, result = sigma_monitor_step(state, normalised, due, dt_s, settings)
+    looks = {"sigma_mean": look(result.mean, used), "sigma_spread": look(result.variance, used)}
+    if not params.monitors.sigma.exclude:
+        return state, exclusions, (), looks
+    exclusions, findings = _excluded(exclusions, result)
+    return state, exclusions, findings, looks
+
+
+def _excluded(exclusions: Exclusions, result: SigmaMonitorResult) -> tuple[Exclusions, tuple[Finding, ...]]:
+    findings: list[Finding] = []
+    channels, receivers = exclusions.channels, exclusions.receivers
+    failed: BoolArray
+    for cause, each in ((ExclusionCause.SIGMA_MEAN, result.mean), (ExclusionCause.SIGMA_SPREAD, result.variance)):
+        failed = np.logical_or.reduce(each.failed, axis=(0, 1))
+        if failed.any():
+            worst = worst_of(each, axes=2)
+            findings += [
+                _finding(f"rr{row + 1}/{SAT_IDS[satellite]}", cause, worst, (row, satellite))
+                for row, satellite in np.argwhere(failed & ~channels.excluded)
+            ]
+            channels = exclude(channels, failed, cause)
+    failed = np.logical_or.reduce(result.receivers.failed, axis=(0, 1))
+    if failed.any():
+        worst = worst_of(result.receivers, axes=2)
+        findings += [
+            _finding(f"rr{row + 1}", ExclusionCause.SIGMA_SPREAD, worst, (int(row),))
+            for row in np.flatnonzero(failed & ~receivers.excluded)
+        ]
+        receivers = exclude(receivers, failed, ExclusionCause.SIGMA_SPREAD)
+    return replace(exclusions, channels=channels, receivers=receivers), tuple(findings)
+
+
+def _finding(subject: str, cause: ExclusionCause, result: MonitorResult, place: tuple[int, ...]) -> Finding:
+    value, threshold = result.at(*place)
+    return Finding(subject=subject, cause=cause, value=value, threshold=threshold)
