@@ -22,7 +22,7 @@ from gbas_ground.monitor_params import (
 from gbas_ground.params import GroundParams
 from gbas_ground.station import GroundEpoch, GroundStation, StationState, initial_state
 from gbas_msgs_py.events import Event
-from gbas_msgs_py.records import ChannelEpoch, IntegrityEpoch
+from gbas_msgs_py.records import ChannelEpoch, IntegrityEpoch, MonitorEpoch
 from gbas_msgs_py.vdb.burst import Burst
 from synthetic_ranges import HEIGHT_M, LATITUDE_RAD, LONGITUDE_RAD, TOW_S, WEEK, Truth, receiver_positions_m
 
@@ -65,6 +65,7 @@ class Run:
 
     seconds: list[float]
     integrity: list[IntegrityEpoch]
+    statistics: list[MonitorEpoch]
     channels: list[ChannelEpoch]
     bursts: list[tuple[Burst, ...]]
     events: list[Event]
@@ -96,7 +97,7 @@ def run(
     The constellation counts as received long before the start, unless `ephemerides` says what is received when.
     """
     received = {0.0: (_earlier(world.ephemeris),)} if ephemerides is None else ephemerides
-    result = Run([], [], [], [], [], initial_state(station) if state is None else state)
+    result = Run([], [], [], [], [], [], initial_state(station) if state is None else state)
     for second in seconds:
         week, tow_s = add_seconds(*start, second)
         carrier = None if carrier_error_m is None else carrier_error_m(second)
@@ -110,6 +111,7 @@ def run(
         result.state, monitored, bursts = GroundStation.step(result.state, epoch, station)
         result.seconds.append(second)
         result.integrity.append(monitored.integrity)
+        result.statistics.append(monitored.statistics)
         result.channels.append(monitored.channels)
         result.bursts.append(bursts)
         result.events.extend(monitored.events)

@@ -238,7 +238,11 @@ def watch(state: WatchState, seen: Seen, params: GroundParams) -> tuple[WatchSta
     acceleration, carrier = _acceleration(
         state.acceleration, residual_m, seen, settings, exclude=sections.acceleration.exclude
     )
-    differences = _double_differences(residual_m, seen, settings)
+    # A channel that jumped alone must not make a gradient of its satellite.
+    steady = seen.ready
+    for verdict in carrier.channels:
+        steady = steady & ~verdict.result.failed
+    differences = _double_differences(residual_m, steady, seen, settings)
     gradient = _gradient(differences, seen, settings, exclude=sections.gradient.exclude)
     ephemeris, orbit = _ephemeris(state.ephemeris, differences, seen, settings, exclude=sections.ephemeris.exclude)
     power, expectation = _power(
@@ -348,11 +352,13 @@ def _channels(found: CarrierAccelerationResult) -> MonitorResult:
     return replace(worst, failed=found.failed_channels & (worst.statistic > worst.threshold))
 
 
-def _double_differences(residual_m: FloatArray, seen: Seen, settings: _Settings) -> DoubleDifferences:
-    """Of the channels that are ready, over all baselines."""
+def _double_differences(
+    residual_m: FloatArray, channels: BoolArray, seen: Seen, settings: _Settings
+) -> DoubleDifferences:
+    """Of the channels given, over all baselines."""
     params, elevation_rad = settings.gradient, seen.expected.elevation_rad
     references = reference_satellites(seen.may_refer, elevation_rad, params.references)
-    used_m = np.where(seen.ready[:, np.newaxis], residual_m[:, list(params.bands)], np.nan)
+    used_m = np.where(channels[:, np.newaxis], residual_m[:, list(params.bands)], np.nan)
     return double_differences(used_m, settings.site.baselines, references, elevation_rad, params.noise, params.bands)
 
 
