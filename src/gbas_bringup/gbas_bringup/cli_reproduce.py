@@ -79,6 +79,8 @@ def _print_tables(reproductions: Iterable[Reproduction]) -> None:
     from rich.table import Table
     from rich.text import Text
 
+    from gbas_studies.reproduction.items import reason
+
     console = Console(width=None if sys.stdout.isatty() else _WIDE, highlight=False)
     for reproduction in reproductions:
         console.print(Text(reproduction.title, style="bold"))
@@ -93,8 +95,8 @@ def _print_tables(reproductions: Iterable[Reproduction]) -> None:
                 table.add_column(name, justify="right" if number else "left", overflow="fold")
             for item in section.items:
                 how = Text(item.definition)
-                if item.why:
-                    how.append(f"\n{item.why}", style="dim")
+                if why := reason(item):
+                    how.append(f"\n{why}", style="dim")
                 mark = Text(item.verdict.value, style=_STYLES[item.verdict.name])
                 cells = (item.name, item.paper_text, item.ours_text, item.unit)
                 table.add_row(mark, *(Text(cell) for cell in cells), how)

@@ -223,12 +223,17 @@ class Claim:
 Item = Value | Claim
 
 
+def reason(item: Item) -> str:
+    """Why, where a reader has to know: nothing for what is reproduced."""
+    return "" if item.verdict is Verdict.REPRODUCED else item.why
+
+
 def _common(item: Item) -> dict[str, Any]:
     return {
         "definition": item.definition,
         "verdict": item.verdict.name.lower(),
         "mark": item.verdict.value,
-        "why": item.why,
+        "why": reason(item),
     }
 
 

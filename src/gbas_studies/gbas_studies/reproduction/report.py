@@ -17,7 +17,7 @@ import jinja2
 import numpy as np
 from numpy.typing import NDArray
 
-from gbas_studies.reproduction.items import Picture, Reproduction, Verdict
+from gbas_studies.reproduction.items import Picture, Reproduction, Verdict, reason
 
 SCHEMA: Final = "gbas/reproduction/1"
 _DPI: Final = 150
@@ -112,4 +112,5 @@ def _page(reproductions: Sequence[Reproduction], images: Mapping[str, str], comm
         notes=notes,
         version=version(_PACKAGE),
         verdicts=list(Verdict),
+        reason=reason,
     )
