@@ -183,10 +183,13 @@ def test_missing_is_not_good():
     values = world(np.random.default_rng(9), 15)
     values[14, 1, 0, 5] = np.nan  # due and not there
     values[14, :, 0, 9] = np.nan
-    values[14, :, 1, 12] = np.nan  # the second band is due only where it is measured
+    values[14, :, 1, 12] = np.nan  # the second band is due only where it can be judged
     _, results = run(values)
     assert np.argwhere(results[14].failed_channels).tolist() == [[0, 9], [1, 5], [1, 9], [2, 9], [3, 9]]
     assert np.flatnonzero(results[14].failed_satellites).tolist() == [9]
+    values = world(np.random.default_rng(9), 15)
+    values[:13, :, 1, 12] = np.nan  # and one that has just come
+    assert not np.array([each.failed_satellites for each in run(values)[1]]).any()
     _, results = run(np.full_like(values, np.nan))
     assert (results[-1].failed_satellites == HERE).all()
     assert (results[-1].failed_channels == HERE).all()

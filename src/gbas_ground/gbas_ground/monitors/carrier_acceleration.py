@@ -46,7 +46,7 @@ class CarrierAccelerationParams:
     Attributes
     ----------
     bands : tuple of int
-        Carriers tested; the first one is due wherever a channel is, the others where they are measured.
+        Carriers tested; the first one is due wherever a channel is, the others where there are epochs enough.
     points : int
         Most epochs in the fit.
     window_s : float
@@ -202,7 +202,8 @@ def carrier_acceleration_step(
     shape = (len(STATISTICS), *residual_m.shape)
     values = np.full((3, *shape), np.nan)
     values[..., here] = known
-    wanted = due[:, np.newaxis] & (np.isfinite(residual_m) | (np.arange(len(params.bands)) == 0)[:, np.newaxis])
+    first = (np.arange(len(params.bands)) == 0)[:, np.newaxis]
+    wanted = due[:, np.newaxis] & (first | np.isfinite(values[0, 0]))
     return state, _concluded(_Known(*values), wanted, k, params)
 
 
