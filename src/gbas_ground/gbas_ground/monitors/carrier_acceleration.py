@@ -14,9 +14,9 @@ one of two, are the satellite's.
 
 Axes: statistics S = 3, receivers R, bands F, satellites N.
 
-Source: the fit, gbas ground monitors of the LAAS test prototype (Luo, Pullen, Dennis, Konno, Xie, Walter, Enge, Datta-
-Barua, Dehel, LAAS ionosphere spatial gradient threat model and impact of LGF and airborne monitoring, ION GPS/GNSS
-2003, and the papers before it on the measurement quality monitor); the budget, Jiang, Milner, Macabiau, ENC 2015.
+Source: Xie, Pullen, Luo, Normark, Akos, Lee, Enge, Pervan, Integrity design and updated test results for the Stanford
+LAAS integrity monitor testbed, ION AM 2001 (principle: acceleration, ramp and step of the carrier over some epochs);
+Jiang, Milner, Macabiau, ENC 2015 (budget). The removal of the clocks and the thresholds are ours.
 """
 
 from __future__ import annotations
