@@ -328,8 +328,9 @@ def _concluded(
     statistic = known.statistic
     size = np.abs(statistic)
     channels = upper_limit(size, known.threshold, wanted[np.newaxis])
-    there = np.isfinite(statistic[0])
-    beyond = np.logical_or.reduce(size > known.threshold, axis=0)  # (R, F, N)
+    # channels that are not due judge no satellite that others are due for; alone, they show how it would do
+    there = np.isfinite(statistic[0]) & (wanted | ~wanted.any(axis=0))
+    beyond = np.logical_or.reduce(size > known.threshold, axis=0) & there  # (R, F, N)
     number = beyond.sum(axis=0)
     alone = (number == 1) & (there.sum(axis=0) >= 3)
     taken = there & ~(beyond & alone)

@@ -50,9 +50,9 @@ class SigmaMonitorParams:
     window_s : tuple of float
         Time constants of the windows, rising; each starts as a plain mean [s].
     correlation_s : tuple of float
-        Correlation time of the B values of each smoothing constant, 100 and 30 s [s]: that of the filter and of a minute
-        or so of multipath. Uncertain, ours; two geodetic receivers of 2010 have some 90 s with either constant. Too
-        short a time raises false alarms, too long a time thresholds.
+        Correlation time of the B values of each smoothing constant, 100 and 30 s [s]: that of the filter and of a
+        minute or so of multipath. Uncertain, ours; two geodetic receivers of 2010 have some 90 s with either constant.
+        Too short a time raises false alarms, too long a time thresholds.
     sample_s : float
         Time between the B values of a channel that are taken [s]; those between would add next to nothing.
     forget_s : float
