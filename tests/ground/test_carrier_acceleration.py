@@ -170,6 +170,20 @@ def test_one_channel_alone_is_the_channels_fault():
     assert np.flatnonzero(results[12].failed_satellites).tolist() == [5]
 
 
+def test_channels_that_are_not_due_do_not_judge():
+    """Two bad channels are the satellite's fault, unless nobody uses them."""
+    values = world(np.random.default_rng(13), 15)
+    values[12:, 2:, 0, 5] += 0.2
+    due = np.broadcast_to(HERE, (4, N_SATS)).copy()
+    due[2:, 5] = False
+    _, results = run(values, due=due)
+    assert not np.array([each.failed_satellites for each in results]).any()
+    due[:, 5] = False
+    _, results = run(values, due=due)
+    assert not results[12].failed_satellites.any()
+    assert results[12].satellites.statistic[0, 0, 5] > results[12].satellites.threshold[0, 0, 5]  # to be seen
+
+
 @pytest.mark.parametrize("receivers", [1, 2])
 def test_with_one_receiver_or_two_it_is_the_satellite(receivers):
     values = world(np.random.default_rng(8), 15, receivers=receivers)
@@ -183,10 +197,13 @@ def test_missing_is_not_good():
     values = world(np.random.default_rng(9), 15)
     values[14, 1, 0, 5] = np.nan  # due and not there
     values[14, :, 0, 9] = np.nan
-    values[14, :, 1, 12] = np.nan  # the second band is due only where it is measured
+    values[14, :, 1, 12] = np.nan  # the second band is due only where it can be judged
     _, results = run(values)
     assert np.argwhere(results[14].failed_channels).tolist() == [[0, 9], [1, 5], [1, 9], [2, 9], [3, 9]]
     assert np.flatnonzero(results[14].failed_satellites).tolist() == [9]
+    values = world(np.random.default_rng(9), 15)
+    values[:13, :, 1, 12] = np.nan  # and one that has just come
+    assert not np.array([each.failed_satellites for each in run(values)[1]]).any()
     _, results = run(np.full_like(values, np.nan))
     assert (results[-1].failed_satellites == HERE).all()
     assert (results[-1].failed_channels == HERE).all()

@@ -44,8 +44,9 @@ def given(residual_m, sigma_m=0.005):
     wavelength = WAVELENGTH_M[[L1, L5]][:, np.newaxis]
     wrapped = residual_m - wavelength * np.rint(residual_m / wavelength)
     value = np.where(HERE, wrapped, np.nan)
+    sigma = np.where(np.isnan(value), np.nan, sigma_m)
     return DoubleDifferences(
-        residual_m=value, sigma_m=np.where(np.isnan(value), np.nan, sigma_m), reference=np.zeros(SHAPE, dtype=np.int64)
+        residual_m=value, sigma_m=sigma, nominal_sigma_m=sigma, reference=np.zeros(SHAPE, dtype=np.int64)
     )
 
 
@@ -242,10 +243,10 @@ def test_missing_is_not_good():
     _, results = run([nothing])
     assert (results[0].failed == HERE).all()
     single = baselines_of(BRAUNSCHWEIG_M[:1], BRAUNSCHWEIG_M[0])
+    empty = np.zeros((0, 2, N_SATS))
     none = DoubleDifferences(
-        residual_m=np.zeros((0, 2, N_SATS)), sigma_m=np.zeros((0, 2, N_SATS)),
-        reference=np.zeros((0, 2, N_SATS), dtype=np.int64),
-    )  # fmt: skip
+        residual_m=empty, sigma_m=empty, nominal_sigma_m=empty, reference=np.zeros(empty.shape, dtype=np.int64)
+    )
     _, results = run([none], site=single)
     assert (results[0].failed == HERE).all()
 

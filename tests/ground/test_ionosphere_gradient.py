@@ -95,6 +95,10 @@ def test_as_written_out_in_loops():
     np.testing.assert_allclose(made.residual_m, expected[0], rtol=0.0, atol=1e-10)
     np.testing.assert_allclose(made.sigma_m, expected[1], rtol=1e-12)
     assert ((made.reference == NO_REFERENCE) == np.isnan(made.residual_m)).all()
+    # A gradient larger than all noise, less than half a wavelength everywhere: the middle one is the nominal one.
+    residual, site = made_up(rng, {20: 60e-6}, noise=1e-6, params=params)
+    made = double_differences(residual, site.baselines, references, ELEVATION, params.noise, params.bands)
+    np.testing.assert_allclose(made.sigma_m[..., 20], made.nominal_sigma_m[..., 20], rtol=1e-12)
 
 
 def test_paper_baselines_and_signs():
@@ -264,7 +268,7 @@ def test_false_alarms_and_missed_detections_by_simulation():
     longest = int(lengths.argmax())
     for _ in range(epochs):
         residual, _ = made_up(rng, {satellite: 0.0}, params=params)
-        sigma = verdict(residual, site, params=params)[0].sigma_m[longest, 0, satellite]
+        sigma = verdict(residual, site, params=params)[0].nominal_sigma_m[longest, 0, satellite]
         gradient = edge * sigma / lengths[longest]
         residual, _ = made_up(rng, {satellite: gradient}, params=params)
         missed += not verdict(residual, site, params=params)[1].verdict.failed[satellite]
@@ -361,7 +365,7 @@ def test_coverage_is_that_of_the_siting_functions_and_never_more(fuse):
         return coverage_percent(monitors, site.k_ffd + site.k_md, fuse=fuse) / 100.0
 
     for satellite in np.flatnonzero(HERE):
-        largest = float(made.sigma_m[:, 0, satellite].max())
+        largest = float(made.nominal_sigma_m[:, 0, satellite].max())
         # sigmas are rounded up by at most 5 %
         assert exact(1.05 * largest) - 1e-12 <= result.coverage[satellite] <= exact(largest) + 1e-12
 

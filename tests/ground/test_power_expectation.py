@@ -78,9 +78,9 @@ def test_false_alarms_are_those_of_the_formula():
     assert failed == pytest.approx(0.01, rel=0.2)
 
 
-@pytest.mark.parametrize(("drop_db", "seconds"), [(20.0, 0.5), (15.0, 1.0), (10.0, 1.5)])
+@pytest.mark.parametrize(("drop_db", "seconds"), [(10.5, 0.0), (7.0, 0.5), (5.4, 1.5)])
 def test_low_power_of_a_satellite_is_found_in_time(drop_db, seconds):
-    """Five above the table: a drop of three times that takes two epochs, of twice that three (weights of a third)."""
+    """Five above the table; weights of a half: 1/2, 3/4, 7/8 and 15/16 of a drop after 0, 0.5, 1 and 1.5 s."""
     values = level(30)
     values[20:, :, :, 5] -= drop_db
     _, results = run(values)

@@ -14,9 +14,9 @@ one of two, are the satellite's.
 
 Axes: statistics S = 3, receivers R, bands F, satellites N.
 
-Source: the fit, gbas ground monitors of the LAAS test prototype (Luo, Pullen, Dennis, Konno, Xie, Walter, Enge, Datta-
-Barua, Dehel, LAAS ionosphere spatial gradient threat model and impact of LGF and airborne monitoring, ION GPS/GNSS
-2003, and the papers before it on the measurement quality monitor); the budget, Jiang, Milner, Macabiau, ENC 2015.
+Source: Xie, Pullen, Luo, Normark, Akos, Lee, Enge, Pervan, Integrity design and updated test results for the Stanford
+LAAS integrity monitor testbed, ION AM 2001 (principle: acceleration, ramp and step of the carrier over some epochs);
+Jiang, Milner, Macabiau, ENC 2015 (budget). The removal of the clocks and the thresholds are ours.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class CarrierAccelerationParams:
     Attributes
     ----------
     bands : tuple of int
-        Carriers tested; the first one is due wherever a channel is, the others where they are measured.
+        Carriers tested; the first one is due wherever a channel is, the others where there are epochs enough.
     points : int
         Most epochs in the fit.
     window_s : float
@@ -202,7 +202,8 @@ def carrier_acceleration_step(
     shape = (len(STATISTICS), *residual_m.shape)
     values = np.full((3, *shape), np.nan)
     values[..., here] = known
-    wanted = due[:, np.newaxis] & (np.isfinite(residual_m) | (np.arange(len(params.bands)) == 0)[:, np.newaxis])
+    first = (np.arange(len(params.bands)) == 0)[:, np.newaxis]
+    wanted = due[:, np.newaxis] & (first | np.isfinite(values[0, 0]))
     return state, _concluded(_Known(*values), wanted, k, params)
 
 
@@ -327,8 +328,9 @@ def _concluded(
     statistic = known.statistic
     size = np.abs(statistic)
     channels = upper_limit(size, known.threshold, wanted[np.newaxis])
-    there = np.isfinite(statistic[0])
-    beyond = np.logical_or.reduce(size > known.threshold, axis=0)  # (R, F, N)
+    # channels that are not due judge no satellite that others are due for; alone, they show how it would do
+    there = np.isfinite(statistic[0]) & (wanted | ~wanted.any(axis=0))
+    beyond = np.logical_or.reduce(size > known.threshold, axis=0) & there  # (R, F, N)
     number = beyond.sum(axis=0)
     alone = (number == 1) & (there.sum(axis=0) >= 3)
     taken = there & ~(beyond & alone)

@@ -139,5 +139,3 @@ def receiver_mean(values: FloatArray, averaged: BoolArray) -> tuple[FloatArray, 
     count = averaged.sum(axis=0)
     total = np.where(averaged, values, 0.0).sum(axis=0)
     return np.where(count > 0, total / np.maximum(count, 1), np.nan), count
-
-

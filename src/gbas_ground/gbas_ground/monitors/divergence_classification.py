@@ -53,7 +53,6 @@ class Classification:
             return ()
         return tuple(MODES[place] for place in np.flatnonzero(column >= column.max() * (1.0 - 1e-9)))
 
-
     def plausible(self, satellite: int, mass: float = 0.95) -> tuple[str, ...]:
         """Fewest modes that together have so much of the posterior, from the most to the least likely."""
         column = self.posterior[:, satellite]

@@ -205,12 +205,15 @@ class DoubleDifferences:
         Within half a wavelength [m]; NaN where there is none.
     sigma_m : (B, F, N) array
         Its sigma [m].
+    nominal_sigma_m : (B, F, N) array
+        Sigma of the one that is the middle one without noise: for what can be detected [m].
     reference : (B, F, N) int array
         The reference satellite; -1 where there is none.
     """
 
     residual_m: FloatArray
     sigma_m: FloatArray
+    nominal_sigma_m: FloatArray
     reference: IntArray
 
 
@@ -243,37 +246,50 @@ def double_differences(
     that, and it is the others that fail. A satellite with a single reference shares its verdict.
     """
     shape = (len(baselines), len(bands), N_SATS)
-    result = np.full(shape, np.nan), np.full(shape, np.nan), np.full(shape, NO_REFERENCE)
     single = residual_m[baselines.second] - residual_m[baselines.first]
+    factors = noise.factors(len(residual_m))
+    scale = np.hypot(factors[baselines.first], factors[baselines.second])
+    variance = (scale[:, np.newaxis, np.newaxis] * noise.sigma_m(elevation_rad, bands)) ** 2
     here = np.flatnonzero(np.isfinite(single).any(axis=(0, 1)))
-    if here.size:
-        factors = noise.factors(len(residual_m))
-        scale = np.hypot(factors[baselines.first], factors[baselines.second])
-        sigma = scale[:, np.newaxis, np.newaxis] * noise.sigma_m(elevation_rad, bands)
-        parts = _middle(single, sigma, references, here, WAVELENGTH_M[list(bands)])
-        for whole, part in zip(result, parts, strict=True):
-            whole[..., here] = part
-    return DoubleDifferences(residual_m=result[0], sigma_m=result[1], reference=result[2])
+    result = DoubleDifferences(
+        residual_m=np.full(shape, np.nan),
+        sigma_m=np.full(shape, np.nan),
+        nominal_sigma_m=np.full(shape, np.nan),
+        reference=np.full(shape, NO_REFERENCE),
+    )
+    if here.size and len(baselines):
+        found = _middle(single, variance, references, here, WAVELENGTH_M[list(bands)])
+        for name, value in zip(("residual_m", "sigma_m", "nominal_sigma_m", "reference"), found, strict=True):
+            getattr(result, name)[..., here] = value
+    return result
 
 
 def _middle(
-    single_m: FloatArray, sigma_m: FloatArray, references: IntArray, here: IntArray, wavelength_m: FloatArray
-) -> tuple[FloatArray, FloatArray, IntArray]:
-    """Residual, sigma and reference of the middle statistic of the satellites `here`."""
+    single_m: FloatArray, variance_m2: FloatArray, references: IntArray, here: IntArray, wavelength_m: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, IntArray]:
+    """Residual, sigma, nominal sigma and reference of the middle statistic of the satellites `here`."""
     others = references[here]  # (n, P)
     valid = (others != NO_REFERENCE) & (others != here[:, np.newaxis])
-    difference = single_m[..., here, np.newaxis] - single_m[..., others]  # (B, F, n, P)
+    difference = single_m.take(here, axis=-1)[..., np.newaxis] - single_m.take(others, axis=-1)  # (B, F, n, P)
     wrapped = np.where(valid, wrap_m(difference, wavelength_m[:, np.newaxis, np.newaxis]), np.nan)
-    variance = sigma_m**2
-    sigma = np.sqrt(variance[..., here, np.newaxis] + variance[..., others])
-    order = np.argsort(np.abs(wrapped) / sigma, axis=-1)  # NaN last
-    number = np.isfinite(wrapped).sum(axis=-1, keepdims=True)
-    middle = np.take_along_axis(order, np.maximum(number - 1, 0) // 2, axis=-1)
-    residual = np.take_along_axis(wrapped, middle, axis=-1)[..., 0]
-    chosen = np.take_along_axis(np.broadcast_to(others, wrapped.shape), middle, axis=-1)[..., 0]
-    there = np.isfinite(residual)
-    spread = np.where(there, np.take_along_axis(sigma, middle, axis=-1)[..., 0], np.nan)
-    return residual, spread, np.where(there, chosen, NO_REFERENCE)
+    variance = variance_m2.take(here, axis=-1)[..., np.newaxis] + variance_m2.take(others, axis=-1)
+    there = np.isfinite(wrapped)
+    number = there.sum(axis=-1)
+    rank = np.maximum(number - 1, 0) // 2
+    each = np.arange(number.size).reshape(number.shape) * others.shape[-1]
+    order = np.argsort(wrapped**2 / variance, axis=-1).ravel()  # NaN last
+    middle = order[each + rank] + each
+    # Without noise a gradient is the larger against its sigma the smaller that is: the middle one from above.
+    ordered = np.sort(np.where(there, variance, np.nan), axis=-1).ravel()
+    nominal = np.sqrt(ordered[each + np.maximum(number - 1 - rank, 0)])
+    known = number > 0
+    chosen = np.broadcast_to(others, wrapped.shape).reshape(-1)[middle]
+    return (
+        wrapped.ravel()[middle],
+        np.where(known, np.sqrt(variance.ravel()[middle]), np.nan),
+        nominal,
+        np.where(known, chosen, NO_REFERENCE),
+    )
 
 
 def decided(statistic: FloatArray, threshold: FloatArray, fuse: Fuse = "any") -> tuple[FloatArray, FloatArray]:

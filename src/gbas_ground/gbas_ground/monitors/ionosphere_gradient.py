@@ -124,7 +124,7 @@ class GradientSite:
     length_m: FloatArray
     k_ffd: float
     k_md: float
-    _known: dict[int, float] = field(default_factory=dict, repr=False)  # coverages computed so far
+    _known: dict[tuple[int, ...], float] = field(default_factory=dict, repr=False)  # coverages computed so far
 
 
 def gradient_site(positions_m: FloatArray, reference_m: FloatArray, params: IonosphereGradientParams) -> GradientSite:
@@ -196,11 +196,14 @@ def check_ionosphere_gradient(
     """
     wavelength = WAVELENGTH_M[list(params.bands)][:, np.newaxis]
     threshold = site.k_ffd * differences.sigma_m
-    looked = np.isfinite(differences.residual_m) & (threshold < 0.5 * wavelength)
+    there, half = np.isfinite(differences.residual_m), 0.5 * wavelength
+    looked = there & (threshold < half)
     by_baseline = upper_limit(np.where(looked, np.abs(differences.residual_m), np.nan), threshold, looked)
-    coverage = _coverage(differences.sigma_m, looked, site, params)
-    monitored = (coverage > 0.0) & (coverage >= params.min_coverage)
+    # without noise, so that what is covered does not change with it
+    able = there & (site.k_ffd * differences.nominal_sigma_m < half)
+    coverage = _coverage(differences.nominal_sigma_m, able, site, params)
     statistic, limit = decided(by_baseline.statistic, threshold, params.fuse)
+    monitored = (coverage > 0.0) & (coverage >= params.min_coverage) & np.isfinite(statistic)
     exceeded = due & (statistic > limit)
     failed = exceeded | (due & ~monitored) if params.required else exceeded
     return GradientResult(
@@ -215,28 +218,31 @@ def check_ionosphere_gradient(
 def _coverage(
     sigma_m: FloatArray, looked: BoolArray, site: GradientSite, params: IonosphereGradientParams
 ) -> FloatArray:
-    """Share of the gradients that are detectable, (N,); sigmas are taken as the largest, rounded up."""
-    shape = _relative_sigma(site, params)
-    level = np.max(np.where(looked, sigma_m, 0.0) / shape[..., np.newaxis], axis=(0, 1), initial=0.0)
-    rounded = np.ceil(np.log(np.where(level > 0.0, level, 1.0)) / np.log(_LEVEL)).astype(np.int64)
-    bits = np.int64(1) << np.arange(shape.size, dtype=np.int64)
-    code = bits @ looked.reshape(shape.size, looked.shape[-1])
+    """Share of the gradients that are detectable, (N,).
+
+    Sigmas of a band are taken as its worst baseline's, relative to the receivers' noise, rounded up: few values that
+    come again and again, so that most are known.
+    """
+    scale = _scales(site, params)
+    level = np.where(looked, sigma_m, 0.0) / scale[:, np.newaxis, np.newaxis]
+    largest = level.max(axis=0, initial=0.0)  # (F, N)
+    rounded = np.ceil(np.log(np.where(largest > 0.0, largest, 1.0)) / np.log(_LEVEL)).astype(np.int64)
+    size = looked.shape[0] * looked.shape[1]
+    code = (np.int64(1) << np.arange(size, dtype=np.int64)) @ looked.reshape(size, looked.shape[-1])
     result = np.zeros(code.shape)
-    for satellite in np.flatnonzero(code):
-        key = int(rounded[satellite]) << shape.size | int(code[satellite])
+    satellites = np.flatnonzero(code)
+    keys = zip(code[satellites].tolist(), *rounded[:, satellites].tolist(), strict=True)
+    for satellite, key in zip(satellites, keys, strict=True):
         if key not in site._known:
-            largest = _LEVEL ** int(rounded[satellite])
-            site._known[key] = _coverage_of(int(code[satellite]), largest * shape, site, params)
+            site._known[key] = _coverage_of(key[0], np.outer(scale, _LEVEL ** np.array(key[1:])), site, params)
         result[satellite] = site._known[key]
     return result
 
 
-def _relative_sigma(site: GradientSite, params: IonosphereGradientParams) -> FloatArray:
-    """How sigmas of baselines and bands compare, (B, F), as at low elevations."""
+def _scales(site: GradientSite, params: IonosphereGradientParams) -> FloatArray:
+    """How the noise of the baselines compares, (B,)."""
     factors = params.noise.factors(len(site.baselines.place_m))
-    scale = np.hypot(factors[site.baselines.first], factors[site.baselines.second])
-    low = np.array([params.noise.low_m[band] for band in params.bands])
-    return np.asarray(np.outer(scale, low) / low[0])
+    return np.asarray(np.hypot(factors[site.baselines.first], factors[site.baselines.second]))
 
 
 def _monitors(
@@ -302,7 +308,7 @@ def blind_gradients(
     runway : int
         Place in `params.runway_bearing_rad`.
     """
-    sigma = differences.sigma_m[..., satellite]
+    sigma = differences.nominal_sigma_m[..., satellite]
     wavelength = WAVELENGTH_M[list(params.bands)]
     looked = np.isfinite(differences.residual_m[..., satellite]) & (site.k_ffd * sigma < 0.5 * wavelength)
     code = sum(1 << place for place in np.flatnonzero(looked.ravel()).tolist())

@@ -57,8 +57,8 @@ class PowerExpectationParams:
     channel_margin_db : float
         A single channel may be this much below the table: fading of one antenna [dB].
     average_s : float
-        Time constant of the average [s]: a drop by three times the margin there is takes 0.6 s to be found, one by
-        twice the margin a second.
+        Time constant of the average [s]: at two epochs a second, a drop by twice the margin there is is found at once,
+        and one by 1.07 of it in 1.5 s.
     learn : bool
         Let what the receivers saw raise the minimum.
     drop_db : float
@@ -75,7 +75,7 @@ class PowerExpectationParams:
     elevation_rad: tuple[float, ...] = _ELEVATION_RAD
     minimum_dbhz: tuple[tuple[float, ...], ...] = _MINIMUM_DBHZ
     channel_margin_db: float = 4.0
-    average_s: float = 1.5
+    average_s: float = 1.0
     learn: bool = False
     drop_db: float = 6.0
     learn_s: float = 86_400.0

@@ -15,10 +15,9 @@ single epoch are the B value check's (:mod:`~gbas_ground.monitors.multiple_refer
 
 Axes: windows W, smoothing constants T, receivers R, satellites N.
 
-Source: Pullen, Lee, Luo, Pervan, Chan, Gratton, Ephemeris protection level equations and monitor algorithms for GBAS,
-ION GPS 2001, and Lee, Pullen, Enge, Sigma-mean monitoring for the local area augmentation of GPS, IEEE Trans. AES 42
-(2006) (principle: estimates of mean and sigma of normalised B values over hours); Lugannani, Rice, Adv. Appl. Prob. 12
-(1980), pp. 475-490 (tail). The recursion and the thresholds are ours.
+Source: Lee, Pullen, Enge, Sigma-mean monitoring for the local area augmentation of GPS, IEEE Trans. AES 42 (2006)
+(principle: estimates of mean and sigma of normalised B values over hours); Lugannani, Rice, Adv. Appl. Prob. 12 (1980),
+pp. 475-490 (tail). The recursion and the thresholds are ours.
 """
 
 from __future__ import annotations
@@ -51,8 +50,9 @@ class SigmaMonitorParams:
     window_s : tuple of float
         Time constants of the windows, rising; each starts as a plain mean [s].
     correlation_s : tuple of float
-        Correlation time of the B values of each smoothing constant [s]: 100 and 30 s of the filters and a minute of
-        multipath. Uncertain, ours; too short a time raises false alarms, too long a time thresholds.
+        Correlation time of the B values of each smoothing constant, 100 and 30 s [s]: that of the filter and of a
+        minute or so of multipath. Uncertain, ours; two geodetic receivers of 2010 have some 90 s with either constant.
+        Too short a time raises false alarms, too long a time thresholds.
     sample_s : float
         Time between the B values of a channel that are taken [s]; those between would add next to nothing.
     forget_s : float
@@ -62,7 +62,7 @@ class SigmaMonitorParams:
     """
 
     window_s: tuple[float, ...] = (1800.0, 7200.0)
-    correlation_s: tuple[float, ...] = (160.0, 90.0)
+    correlation_s: tuple[float, ...] = (160.0, 110.0)
     sample_s: float = 50.0
     forget_s: float = 1800.0
     p_false_alarm: float = FALSE_EXCLUSION
