@@ -158,6 +158,19 @@ def test_monte_carlo_counts_what_the_integral_says():
         assert abs(count - 100_000 * expected) <= 5.0 * deviation
 
 
+def test_sweep_by_hand():
+    """One baseline whose range is one period of tents: detected where the delay is not near a multiple."""
+    length_m = 100.0
+    period = LAMBDA_M / length_m
+    star = Star(lengths_m=(length_m,), sigma_m=0.001)
+    swept = noise.sweep(star, (period, 2.0 * period), 4000, 50_000, np.random.default_rng(1))
+    # A uniform delay with symmetric noise, wrapped, is uniform: outside the threshold with 1 - 2 threshold / lambda.
+    expected = 100.0 * (1.0 - 2.0 * star.threshold_m / LAMBDA_M)
+    assert swept.detected_percent == pytest.approx(expected, abs=1e-3)
+    assert abs(swept.simulated_percent - expected) < 5.0 * swept.deviation_percent
+    assert swept.p_false_alarm == pytest.approx(1e-4, rel=1e-6)
+
+
 def test_threshold():
     assert STAR.threshold_m / STAR.sigma_m == pytest.approx(norm.isf(0.5e-4))
 

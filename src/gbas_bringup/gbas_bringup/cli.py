@@ -301,7 +301,8 @@ def bench(
     part: Annotated[
         list[str] | None,
         typer.Option(
-            help="Only this: steps, simulator, ccd, siting, offline, process, latency, replay or files; may be repeated."
+            help="Only this: steps, simulator, ccd, siting, offline, process, latency, replay or files; may be "
+            "repeated."
         ),
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Short runs: less exact.")] = False,
