@@ -1,4 +1,4 @@
-"""gbas siting: both forms, JSON and for people, and errors that name option, value and bound."""
+"""gbas siting and gbas study gradient: JSON and for people, and errors that name option, value and bound."""
 
 from __future__ import annotations
 
@@ -121,6 +121,53 @@ def test_output_for_people():
 )
 def test_bad_input_is_one_line_that_names_it(arguments: str, text: str):
     result = siting(*arguments.split())
+    assert result.exit_code == 2
+    (line,) = result.stderr.splitlines()
+    assert line.startswith("gbas: ")
+    assert text in line
+
+
+# --- gbas study gradient
+
+
+def study(*arguments: object) -> Any:
+    return RUNNER.invoke(app, ["study", "gradient", *(str(each) for each in arguments)], prog_name="gbas")
+
+
+def test_study_of_the_optimum():
+    """At the paper's optimum no gradient is missed with more than 1e-4, and the simulation says the same."""
+    result = study("--baselines-m", "68.584,177.084", "--sigma-m", 0.00698, "--trials", 50_000, "--json")
+    found = json.loads(result.stdout)
+    assert found["worst_p_missed_detection"] <= 1e-4
+    assert 1e-4 < found["p_false_alarm"] < 2e-4  # two baselines of 1e-4 each, that share noise
+    assert found["simulated_percent"] == pytest.approx(
+        found["detected_percent"], abs=5.0 * found["simulated_deviation_percent"]
+    )
+    assert len(found["p_missed_detection"]) == 1700
+
+
+def test_study_for_people():
+    lines = study("--baselines-m", "775.494,740.748", "--sigma-m", 0.002, "--trials", 1000, "--step", 10).stdout
+    assert "threshold               7.781 mm" in lines  # 3.8906 times 2 mm
+    assert "of 300 to 2000 mm/km" in lines
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        ("--baselines-m 0 --sigma-m 0.001", "--baselines-m is 0: must be above 0"),
+        ("--baselines-m 9 --sigma-m 1", "--sigma-m is 1.0: must be above 0, at most 0.02 m"),
+        ("--baselines-m 9 --sigma-m 0.001 --step 0", "--step is 0.0: must be above 0"),
+        ("--baselines-m 9 --sigma-m 0.001 --trials 1", "--trials is 1: must be 1000 to"),
+        ("--baselines-m 9 --sigma-m 0.001 --p-false-alarm 1", "--p-false-alarm is 1.0: must be between 0 and 1"),
+        (
+            "--baselines-m 9 --sigma-m 0.001 --angles-deg 1,2",
+            "--angles-deg is 1,2: must be one number, or one for each",
+        ),
+    ],
+)
+def test_bad_study_is_one_line_that_names_it(arguments: str, text: str):
+    result = study(*arguments.split())
     assert result.exit_code == 2
     (line,) = result.stderr.splitlines()
     assert line.startswith("gbas: ")

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from gbas_core.signals import IONO_RATIO, L1, L5, WAVELENGTH_M
 from gbas_ground.gradient_detectability import GRADIENT_RANGE, coverage_percent, k_factor
 from gbas_ground.siting.chain import chain_lengths_m, chain_statistic_m
+from gbas_ground.siting.contraction import contract
 from gbas_ground.siting.problem import SitingProblem
 from gbas_ground.siting.search import best_siting
 from gbas_ground.siting.worst_gradient import worst_gradient
@@ -151,12 +152,12 @@ def test_closed_form_of_the_chain(n_baselines: int):
 
 def test_five_receivers_do_better_than_the_chain():
     """And the proof holds the claim of the closed form to its place: three, four and six receivers."""
-    best = best_siting(SitingProblem(n_receivers=5), budget=300_000)
+    best = best_siting(SitingProblem(n_receivers=5))
     assert best.statistic_m > 1.019 * chain_statistic_m(LAMBDA_M, GRADIENT_RANGE, 4)
     # By the dense grid of gradients, too.
     on_grid = worst_on_grid_m(best.baselines_m, np.full(4, LAMBDA_M), GRADIENT_RANGE, np.zeros(4), 400_001)
     assert on_grid == pytest.approx(best.statistic_m, abs=1e-6)
-    assert best.statistic_m <= best.bound_m
+    assert best.closed
 
 
 def test_where_the_ratio_does_not_matter():
@@ -231,6 +232,51 @@ def test_bound_of_a_box_holds_in_the_box(box: list[tuple[float, float]], seed: i
         high = low + np.array([[width for _, width in box]])
         inside = low + (high - low) * np.random.default_rng(seed).random((200, len(box)))
         assert problem.guaranteed(inside).statistic_m.max() <= problem.bound_m(low, high)[0] + 1e-12
+
+
+@given(
+    st.lists(st.tuples(st.floats(1.0, 400.0), st.floats(0.1, 60.0)), min_size=2, max_size=3),
+    st.sampled_from([(L1,), (L1, L5)]),
+    st.floats(0.02, 0.09),
+    st.integers(0, 99),
+)
+@settings(max_examples=100)
+def test_contraction_cuts_off_nothing_that_reaches(box: list, bands: tuple[int, ...], reach_m: float, seed: int):
+    problem = SitingProblem(
+        n_receivers=len(box) + 2, existing_m=((0.0, 0.0), (390.0, 5.0)), bands=bands, tolerance_m=0.5
+    )
+    low = np.array([[begin for begin, _ in box]])
+    high = low + np.array([[width for _, width in box]])
+    inside = low + (high - low) * np.random.default_rng(seed).random((400, len(box)))
+    inside = inside[(np.diff(inside) >= 0.0).all(axis=1)]  # places are in ascending order
+    reaching = inside[problem.guaranteed(inside).statistic_m >= reach_m] if inside.size else inside
+    alive = np.ones(1, dtype=np.bool_)
+    contract(
+        low, high, IONO_RATIO[list(bands)], np.array([390.0]), WAVELENGTH_M[list(bands)], 0.5, LOW, HIGH, reach_m, alive
+    )
+    if reaching.size:
+        assert alive[0]
+        assert ((low <= reaching) & (reaching <= high)).all()
+
+
+def test_contraction_cuts_off_something():
+    """From all places: nothing but 300 mm/km times the longest baseline reaches 66 mm at 300 mm/km."""
+    low, high, alive = np.zeros((1, 3)), np.full((1, 3), 250.0), np.ones(1, dtype=np.bool_)
+    bands = [L1]
+    contract(low, high, IONO_RATIO[bands], np.empty(0), WAVELENGTH_M[bands], 0.0, LOW, HIGH, 0.066, alive)
+    assert alive[0]
+    none, best = best_siting(SitingProblem(n_receivers=4)).statistic_m + 1e-4, np.array([[60.0, 115.0, 215.0]])
+    low, high = best.copy(), best + 8.0
+    contract(low, high, IONO_RATIO[bands], np.empty(0), WAVELENGTH_M[bands], 0.0, LOW, HIGH, none, alive)
+    assert not alive[0]
+
+
+@pytest.mark.parametrize("n_receivers", [7, 8])
+def test_proof_closes_for_many_receivers(n_receivers: int):
+    best = best_siting(SitingProblem(n_receivers=n_receivers))
+    assert best.closed
+    assert best.statistic_m >= chain_statistic_m(LAMBDA_M, GRADIENT_RANGE, n_receivers - 1) - 1e-9
+    assert best.statistic_m < 0.5 * LAMBDA_M
 
 
 def test_one_band_is_the_other_in_its_own_units():

@@ -15,7 +15,7 @@ from gbas_bringup.errors import GbasError
 if TYPE_CHECKING:
     from gbas_ground.siting.search import Siting
 
-_MM_PER_KM: Final = 1.0e6
+MM_PER_KM: Final = 1.0e6
 """Millimetres a kilometre in one metre a metre."""
 _SIGNALS: Final = {"L1": ("L1",), "L5": ("L5",), "L1+L5": ("L1", "L5")}
 
@@ -78,7 +78,7 @@ def siting(
     judging = {"--sigma-m": sigma_m, "--angles-deg": angles_deg, "--fuse": fuse}
     if (receivers is None) == (baselines_m is None):
         raise GbasError("siting: give --receivers N to place receivers, or --baselines-m B,... to judge baselines")
-    common = {"gradient_range": _gradients(gradients), "k": _k(k), "bands": _bands(signal)}
+    common = {"gradient_range": gradients_of(gradients), "k": _k(k), "bands": _bands(signal)}
     if receivers is not None:
         _only("--receivers", judging)
         _place({"n_receivers": receivers, **_placing(receivers, **_named(placing)), **common}, signal, as_json)
@@ -90,7 +90,7 @@ def siting(
 def _only(form: str, others: dict[str, Any]) -> None:
     for option, value in others.items():
         if value is not None:
-            raise GbasError(f"siting: {option} has no meaning with {form}")
+            raise GbasError(f"{option} has no meaning with {form}")
 
 
 def _named(options: dict[str, Any]) -> dict[str, Any]:
@@ -100,25 +100,28 @@ def _named(options: dict[str, Any]) -> dict[str, Any]:
 # --- options
 
 
-def _numbers(option: str, text: str, bound: str = "numbers separated by commas, without blanks") -> tuple[float, ...]:
+def numbers_of(option: str, text: str, bound: str = "numbers separated by commas, without blanks") -> tuple[float, ...]:
+    """The numbers in an option; complains of anything else."""
     try:
         values = tuple(float(part) for part in text.split(","))
     except ValueError:
         values = ()
-    _check(option, text, bool(values) and all(math.isfinite(value) for value in values), bound)
+    check(option, text, bool(values) and all(math.isfinite(value) for value in values), bound)
     return values
 
 
-def _check(option: str, value: Any, good: bool, bound: str) -> None:
+def check(option: str, value: Any, good: bool, bound: str) -> None:
+    """Complain unless an option's value is good: one line with option, value and bound."""
     if not good:
-        raise GbasError(f"siting: {option} is {value}: must be {bound}")
+        raise GbasError(f"{option} is {value}: must be {bound}")
 
 
-def _gradients(text: str) -> tuple[float, float]:
+def gradients_of(text: str) -> tuple[float, float]:
+    """A range of gradients in mm/km [m/m]."""
     bound = "LOW,HIGH in mm/km, with 0 < LOW < HIGH, at most 100000"
-    values = _numbers("--gradients", text, bound)
-    _check("--gradients", text, len(values) == 2 and 0.0 < values[0] < values[1] <= 1.0e5, bound)
-    return values[0] / _MM_PER_KM, values[1] / _MM_PER_KM
+    values = numbers_of("--gradients", text, bound)
+    check("--gradients", text, len(values) == 2 and 0.0 < values[0] < values[1] <= 1.0e5, bound)
+    return values[0] / MM_PER_KM, values[1] / MM_PER_KM
 
 
 def _k(value: float | None) -> float:
@@ -126,14 +129,14 @@ def _k(value: float | None) -> float:
 
     if value is None:
         return k_factor()
-    _check("--k", value, 0.0 < value <= 100.0, "above 0, at most 100")
+    check("--k", value, 0.0 < value <= 100.0, "above 0, at most 100")
     return value
 
 
 def _bands(signal: str) -> tuple[int, ...]:
     from gbas_core.signals import BAND_INDEX
 
-    _check("--signal", signal, signal in _SIGNALS, "L1, L5 or L1+L5")
+    check("--signal", signal, signal in _SIGNALS, "L1, L5 or L1+L5")
     return tuple(BAND_INDEX[name] for name in _SIGNALS[signal])
 
 
@@ -149,17 +152,17 @@ def _placing(
     from gbas_ground.siting.problem import MAX_RECEIVERS
 
     positions = tuple(_position(text) for text in existing or ())
-    _check("--receivers", receivers, 2 <= receivers <= MAX_RECEIVERS, f"2 to {MAX_RECEIVERS}")
+    check("--receivers", receivers, 2 <= receivers <= MAX_RECEIVERS, f"2 to {MAX_RECEIVERS}")
     fewest = f"at least the number of --existing receivers, {len(positions)}"
-    _check("--receivers", receivers, receivers >= len(positions), fewest)
+    check("--receivers", receivers, receivers >= len(positions), fewest)
     bearing = 90.0 if runway_bearing is None else runway_bearing
-    _check("--runway-bearing", bearing, -360.0 <= bearing <= 360.0, "-360 to 360 degrees")
+    check("--runway-bearing", bearing, -360.0 <= bearing <= 360.0, "-360 to 360 degrees")
     kind = baselines or "star"
-    _check("--baselines", kind, kind in ("star", "all"), "star or all")
+    check("--baselines", kind, kind in ("star", "all"), "star or all")
     tolerance = 0.0 if tolerance_m is None else tolerance_m
-    _check("--tolerance-m", tolerance, 0.0 <= tolerance <= 100.0, "0 to 100 m")
+    check("--tolerance-m", tolerance, 0.0 <= tolerance <= 100.0, "0 to 100 m")
     if max_length_m is not None:
-        _check("--max-length-m", max_length_m, 0.0 < max_length_m <= 1.0e4, "above 0, at most 10000 m")
+        check("--max-length-m", max_length_m, 0.0 < max_length_m <= 1.0e4, "above 0, at most 10000 m")
     return {
         "existing_m": positions,
         "runway_bearing_rad": math.radians(bearing),
@@ -171,8 +174,8 @@ def _placing(
 
 def _position(text: str) -> tuple[float, float]:
     bound = "X,Y in metres, within 100 km of the origin"
-    values = _numbers("--existing", text, bound)
-    _check("--existing", text, len(values) == 2 and all(abs(value) <= 1.0e5 for value in values), bound)
+    values = numbers_of("--existing", text, bound)
+    check("--existing", text, len(values) == 2 and all(abs(value) <= 1.0e5 for value in values), bound)
     return values[0], values[1]
 
 
@@ -210,7 +213,7 @@ def _siting_document(best: Siting, signal: str) -> dict[str, Any]:
             {"receivers": [int(first) + 1, int(second) + 1], "length_m": float(length)}
             for (first, second), length in zip(problem.pairs, best.baselines_m, strict=True)
         ],
-        "worst_gradient_mm_per_km": best.worst_gradient * _MM_PER_KM,
+        "worst_gradient_mm_per_km": best.worst_gradient * MM_PER_KM,
         "certificate": {
             "sigma_bound_m": best.sigma_bound_m,
             "sigma_gap_m": best.sigma_bound_m - best.sigma_m,
@@ -222,7 +225,7 @@ def _siting_document(best: Siting, signal: str) -> dict[str, Any]:
             "receivers": problem.n_receivers,
             "existing": len(problem.existing_m),
             "runway_bearing_deg": math.degrees(problem.runway_bearing_rad),
-            "gradients_mm_per_km": [low * _MM_PER_KM, high * _MM_PER_KM],
+            "gradients_mm_per_km": [low * MM_PER_KM, high * MM_PER_KM],
             "k": problem.k,
             "baselines": problem.baselines,
             "tolerance_m": problem.tolerance_m,
@@ -234,7 +237,7 @@ def _siting_document(best: Siting, signal: str) -> dict[str, Any]:
 
 def _print_siting(best: Siting, signal: str) -> None:
     problem = best.problem
-    low, high = (gradient * _MM_PER_KM for gradient in problem.gradient_range)
+    low, high = (gradient * MM_PER_KM for gradient in problem.gradient_range)
     kind = "all baselines" if problem.baselines == "all" else "baselines of receiver 1"
     print(f"{problem.n_receivers} receivers, {kind}, {signal}, gradients {low:g} to {high:g} mm/km, k {problem.k:.5g}")
     if problem.tolerance_m:
@@ -245,7 +248,7 @@ def _print_siting(best: Siting, signal: str) -> None:
     print(f"no other places allow     {best.sigma_bound_m * 1e3:.3f} mm{_proof(best)}")
     limited = ": the length limit binds" if best.length_limited else ""
     print(f"longest baseline          {best.length_m:.2f} m along the runway{limited}")
-    print(f"worst gradient            {best.worst_gradient * _MM_PER_KM:.1f} mm/km")
+    print(f"worst gradient            {best.worst_gradient * MM_PER_KM:.1f} mm/km")
     rows = [
         (str(number + 1), "stays" if number < len(problem.existing_m) else "new", *(f"{each:.2f}" for each in numbers))
         for number, numbers in enumerate(
@@ -275,13 +278,13 @@ def _judge(
 
     if sigma is None:
         raise GbasError("siting: --sigma-m is missing: the double-difference sigma in metres")
-    _check("--fuse", fuse, fuse in ("any", "all"), "any or all")
-    lengths = _numbers("--baselines-m", baselines)
+    check("--fuse", fuse, fuse in ("any", "all"), "any or all")
+    lengths = numbers_of("--baselines-m", baselines)
     good = all(0.0 < length <= 1.0e5 for length in lengths)
-    _check("--baselines-m", baselines, good, "above 0, at most 100000 m each")
-    turned = _as_many("--angles-deg", angles or "0", len(lengths))
-    sigmas = _as_many("--sigma-m", sigma, len(lengths))
-    _check("--sigma-m", sigma, all(0.0 < each <= 1.0 for each in sigmas), "above 0, at most 1 m each")
+    check("--baselines-m", baselines, good, "above 0, at most 100000 m each")
+    turned = as_many("--angles-deg", angles or "0", len(lengths))
+    sigmas = as_many("--sigma-m", sigma, len(lengths))
+    check("--sigma-m", sigma, all(0.0 < each <= 1.0 for each in sigmas), "above 0, at most 1 m each")
     along = [length * abs(math.cos(math.radians(angle))) for length, angle in zip(lengths, turned, strict=True)]
     monitors = [
         detectability.BaselineMonitor(length_m=length, sigma_m=each, band=band)
@@ -290,7 +293,7 @@ def _judge(
     ]
     terms = {"fuse": fuse, "gradient_range": common["gradient_range"]}
     k = common["k"]
-    blind = detectability.blind_intervals(monitors, k, **terms) * _MM_PER_KM
+    blind = detectability.blind_intervals(monitors, k, **terms) * MM_PER_KM
     coverage = detectability.coverage_percent(monitors, k, **terms)
     # In units of each baseline's own sigma: by how much all sigmas may grow, or must shrink, for full coverage.
     ratio = (
@@ -311,14 +314,14 @@ def _judge(
             "angles_deg": list(turned),
             "along_runway_m": along,
             "sigma_m": list(sigmas),
-            "gradients_mm_per_km": [gradient * _MM_PER_KM for gradient in common["gradient_range"]],
+            "gradients_mm_per_km": [gradient * MM_PER_KM for gradient in common["gradient_range"]],
             "k": k,
         }
         if fuse == "any":
             document["sigma_for_full_coverage_m"] = [float(ratio) * each for each in sigmas]
         print_json(document)
         return
-    low, high = (gradient * _MM_PER_KM for gradient in common["gradient_range"])
+    low, high = (gradient * MM_PER_KM for gradient in common["gradient_range"])
     print(f"{coverage:.2f} % of {low:g} to {high:g} mm/km is detected by {_by(fuse, len(monitors))}")
     if fuse == "any":
         largest = ", ".join(f"{1e3 * float(ratio) * each:.3f}" for each in dict.fromkeys(sigmas))
@@ -334,9 +337,10 @@ def _by(fuse: str, count: int) -> str:
     return f"at least one of {count} baselines" if fuse == "any" else f"all of {count} baselines at once"
 
 
-def _as_many(option: str, text: str, count: int) -> tuple[float, ...]:
-    values = _numbers(option, text)
-    _check(option, text, len(values) in (1, count), f"one number, or one for each of the {count} baselines")
+def as_many(option: str, text: str, count: int) -> tuple[float, ...]:
+    """Numbers, one for each baseline; a single one is that of all."""
+    values = numbers_of(option, text)
+    check(option, text, len(values) in (1, count), f"one number, or one for each of the {count} baselines")
     return values if len(values) == count else values * count
 
 

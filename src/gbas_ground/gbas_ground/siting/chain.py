@@ -4,8 +4,8 @@ With ``q`` baselines from the first receiver and ``rho`` the ratio of the highes
 baseline begins at the lowest gradient and each tent ends where that of the next shorter baseline begins, the last at
 the highest gradient: ``D = wavelength / (1 + rho^(1/q))``.
 
-It is the best arrangement of three and four receivers over 300 to 2000 mm/km, but not of any number: with five
-receivers arrangements that use second tents are better.
+It is the best arrangement of three, four and six receivers over 300 to 2000 mm/km, but not of any number: with five
+and seven, arrangements that use second tents are better (:mod:`~gbas_ground.siting.search` proves both).
 """
 
 from __future__ import annotations

@@ -2,7 +2,9 @@
 
 A box is a set of places. What no places in it can exceed is exact to compute (:meth:`SitingProblem.bound_m`): at any
 gradient a baseline's statistic changes by at most the gradient times the change of its length. Boxes that cannot beat
-the best places found by more than the gap are dropped, the others halved where they are widest for their distance.
+the best places found by more than the gap are dropped; the others lose what cannot reach that much
+(:mod:`~gbas_ground.siting.contraction`, for the baselines of one receiver) and are halved where they are widest for
+their distance.
 When none is left, nothing beats the result by more than the gap; when the budget ends first, the largest bound that is
 left says what could.
 """
@@ -18,12 +20,13 @@ from gbas_core.record import FloatArray
 from gbas_core.signals import IONO_RATIO, WAVELENGTH_M
 from gbas_ground.gradient_detectability import coverage_percent
 from gbas_ground.siting.chain import chain_lengths_m
+from gbas_ground.siting.contraction import contract
 from gbas_ground.siting.problem import SitingProblem
 
 GAP_M: Final = 1.0e-8
 """Of the statistic: 1.3 nm of sigma."""
-BUDGET: Final = 4_000_000
-"""Boxes bounded before the search ends without closing the gap: some seconds."""
+BUDGET: Final = 1_000_000
+"""Sets of places and boxes computed before the search ends without closing the gap: some seconds."""
 # Two places are compared by their width over their distance, as if they were this much farther away [m].
 _NEAR_M: Final = 5.0
 _POLISH_ROUNDS: Final = 40
@@ -130,7 +133,7 @@ def best_siting(problem: SitingProblem, *, gap_m: float = GAP_M, budget: int = B
     gap_m : float
         The search ends when nothing can beat the result by more than this, in the statistic [m].
     budget : int
-        Or when so many boxes have been computed: then :attr:`Siting.bound_m` says what is left open.
+        Or when so many sets of places and boxes have been computed: then :attr:`Siting.bound_m` says what is left open.
 
     Returns
     -------
@@ -162,7 +165,7 @@ def _chain(problem: SitingProblem) -> FloatArray:
 def _branch_and_bound(search: _Search, low_m: FloatArray, high_m: FloatArray, gap_m: float, budget: int) -> float:
     """Improve the search's best; return what nothing exceeds."""
     problem, first = search.problem, (low_m[0], high_m[0])
-    while True:
+    while low_m.size:
         if search.offer(0.5 * (low_m + high_m)):
             search.polish(*first, float((high_m - low_m).max()))
         bound = problem.bound_m(low_m, high_m, enough_m=search.statistic_m + gap_m)
@@ -173,7 +176,29 @@ def _branch_and_bound(search: _Search, low_m: FloatArray, high_m: FloatArray, ga
         low_m, high_m = low_m[kept], high_m[kept]
         if search.evaluations >= budget:
             return float(bound.max())
+        if problem.baselines == "star":
+            low_m, high_m = _contracted(problem, low_m, high_m, search.statistic_m + gap_m)
         low_m, high_m = _halved(low_m, high_m)
+    return search.statistic_m + gap_m
+
+
+def _contracted(
+    problem: SitingProblem, low_m: FloatArray, high_m: FloatArray, reach_m: float
+) -> tuple[FloatArray, FloatArray]:
+    """Boxes without what cannot reach a statistic."""
+    alive = np.ones(low_m.shape[0], dtype=np.bool_)
+    contract(
+        low_m,
+        high_m,
+        IONO_RATIO[list(problem.bands)],
+        np.abs(problem.fixed_m[1:]),
+        WAVELENGTH_M[list(problem.bands)],
+        problem.tolerance_m,
+        *problem.gradient_range,
+        reach_m,
+        alive,
+    )
+    return low_m[alive], high_m[alive]
 
 
 def _halved(low_m: FloatArray, high_m: FloatArray) -> tuple[FloatArray, FloatArray]:

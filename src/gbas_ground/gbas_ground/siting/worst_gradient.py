@@ -31,7 +31,7 @@ from gbas_core.record import FloatArray
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
-def _compiled(function: _Function) -> _Function:
+def compiled(function: _Function) -> _Function:
     """No ``fastmath``: the order of sums and the meaning of NaN stay."""
     return cast(_Function, njit(cache=True, error_model="numpy")(function))
 
@@ -87,7 +87,7 @@ def worst_gradient(
     return Worst(least.reshape(slope.shape[:-1]), where.reshape(slope.shape[:-1]))
 
 
-@_compiled
+@compiled
 def _each_common(
     slope: FloatArray,
     slack: FloatArray,
@@ -102,7 +102,7 @@ def _each_common(
         least[row], where[row] = _common(slope[row], slack[row], wavelength[0], low, high, enough)
 
 
-@_compiled
+@compiled
 def _each_mixed(
     slope: FloatArray,
     slack: FloatArray,
@@ -117,7 +117,7 @@ def _each_mixed(
         least[row], where[row] = _mixed(slope[row], slack[row], wavelength, low, high, enough)
 
 
-@_compiled
+@compiled
 def _best(gradient: float, slope: FloatArray, slack: FloatArray, wavelength: float, least: float) -> float:
     """The smaller of `least` and the largest statistic at a gradient, one wavelength for all."""
     largest = 0.0
@@ -131,7 +131,7 @@ def _best(gradient: float, slope: FloatArray, slack: FloatArray, wavelength: flo
     return largest
 
 
-@_compiled
+@compiled
 def _best_mixed(gradient: float, slope: FloatArray, slack: FloatArray, wavelength: FloatArray, least: float) -> float:
     """The same for a wavelength of each baseline's own."""
     largest = 0.0
@@ -145,7 +145,7 @@ def _best_mixed(gradient: float, slope: FloatArray, slack: FloatArray, wavelengt
     return largest
 
 
-@_compiled
+@compiled
 def _common(
     slope: FloatArray, slack: FloatArray, wavelength: float, low: float, high: float, enough: float
 ) -> tuple[float, float]:
@@ -178,7 +178,7 @@ def _common(
     return least, where
 
 
-@_compiled
+@compiled
 def _mixed(
     slope: FloatArray, slack: FloatArray, wavelength: FloatArray, low: float, high: float, enough: float
 ) -> tuple[float, float]:

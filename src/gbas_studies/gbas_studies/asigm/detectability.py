@@ -136,6 +136,8 @@ def _figure_4_items(testbed: Testbed, straight: tuple[float, float], along: tupl
         "Figure 4d": (along, "any"),
     }
     coverage = {name: _coverage(lengths, 0.002, fuse) for name, (lengths, fuse) in shares.items()}
+    items += [_worst_gradient(name, lengths) for name, (lengths, _) in both.items()]
+    items.append(_longest_sees_most(straight, along))
     items += [
         Value(name=f"{name}, coverage at 2 mm", ours=share, unit="%", definition="share of 300 to 2000 mm/km")
         for name, share in coverage.items()
@@ -150,6 +152,39 @@ def _figure_4_items(testbed: Testbed, straight: tuple[float, float], along: tupl
         )
     )
     return items
+
+
+def _worst_gradient(name: str, lengths: tuple[float, ...]) -> Value:
+    worst = worst_gradient(lengths, WAVELENGTH, GRADIENT_RANGE)
+    return Value(
+        name=f"Figure 4d, gradient that limits sigma, {name}",
+        paper="5e2",
+        ours=float(worst.gradient) * _MM_PER_KM,
+        unit="mm/km",
+        definition="where the larger tent is lowest",
+        why="The paper sees the limit around 500 mm/km: its figure has beta = 0, or baselines that are not projected.",
+    )
+
+
+def _longest_sees_most(straight: tuple[float, float], along: tuple[float, float]) -> Claim:
+    """Whether RR1-RR2 alone detects more than RR1-RR3 alone."""
+    shares = {
+        (what, sigma_mm): tuple(_coverage([length], sigma_mm * 1e-3, "any") for length in lengths)
+        for what, lengths in (("as they are", straight), ("along the runway", along))
+        for sigma_mm in (1.0, 2.0, 4.0)
+    }
+    return Claim(
+        name="Figure 4: the longest baseline detects most",
+        holds=all(longest > other for longest, other in shares.values()),
+        paper_text="the largest baseline b12 provides the largest availability",
+        ours_text="; ".join(
+            f"{what}, {sigma:g} mm: b12 {longest:.1f} %, b13 {other:.1f} %"
+            for (what, sigma), (longest, other) in shares.items()
+        ),
+        definition="coverage by one baseline alone",
+        why="Each multiple of the wavelength blinds the share 2 k sigma / lambda of a period. How many of them fall "
+        "into the range, and where its ends cut them, decides between baselines; length alone does not.",
+    )
 
 
 def _coverage(lengths_m: Sequence[float], sigma_m: float, fuse: Fuse) -> float:

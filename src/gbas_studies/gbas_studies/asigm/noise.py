@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
 from gbas_core.record import FloatArray
@@ -28,6 +29,7 @@ from gbas_ground.gradient_detectability import (
 )
 from gbas_ground.siting.problem import SitingProblem
 from gbas_ground.siting.search import best_siting
+from gbas_msgs_py.parameters import require
 from gbas_studies.asigm.detectability import WAVELENGTH, K
 from gbas_studies.asigm.testbed import Testbed
 from gbas_studies.reproduction.drawing import LIMIT_COLOUR, new_figure
@@ -39,6 +41,7 @@ _CHUNK: Final = 250_000
 # Gauss-Legendre over 8.5 standard deviations of the first receiver's error: what is outside has 2e-17.
 _REACH: Final = 8.5
 _NODES: Final = 200
+MAX_SIGMA_M: Final = 0.02
 _FARTHEST: Final = 5.0
 """Standard deviations by which a count of a Monte Carlo run may be off."""
 
@@ -53,15 +56,30 @@ class Star:
         Along the runway [m].
     sigma_m : float
         Of the double difference; each receiver's part, between two satellites, has ``sigma / sqrt(2)`` [m].
+    p_false_alarm : float
+        Of one baseline.
+
+    Raises
+    ------
+    ParameterError
+        For values out of bounds.
     """
 
     lengths_m: tuple[float, ...]
     sigma_m: float
+    p_false_alarm: float = P_FALSE_ALARM
+
+    def __post_init__(self) -> None:
+        lengths = self.lengths_m
+        require("baselines", lengths, bool(lengths) and all(0.0 < each <= 1e5 for each in lengths), "0 to 100 km each")
+        # Above, the multiples that are left out of the sums count.
+        require("sigma_m", self.sigma_m, 0.0 < self.sigma_m <= MAX_SIGMA_M, f"above 0, at most {MAX_SIGMA_M} m")
+        require("p_false_alarm", self.p_false_alarm, 0.0 < self.p_false_alarm < 1.0, "between 0 and 1")
 
     @property
     def threshold_m(self) -> float:
         """Distance to the nearest multiple above which a baseline alerts, ``k_ffd sigma`` [m]."""
-        return float(-ndtri(0.5 * P_FALSE_ALARM) * self.sigma_m)
+        return float(-ndtri(0.5 * self.p_false_alarm) * self.sigma_m)
 
 
 def silent_probability(star: Star, gradients: FloatArray) -> FloatArray:
@@ -99,14 +117,17 @@ def _near_a_multiple(centre_m: FloatArray, sigma_m: float, threshold_m: float) -
 def count_silent(star: Star, gradient: float, n_trials: int, random: np.random.Generator) -> int:
     """In how many of so many trials with noise no baseline alerts."""
     delay_m = gradient * np.asarray(star.lengths_m)
-    silent = 0
-    for begin in range(0, n_trials, _CHUNK):
-        size = min(_CHUNK, n_trials - begin)
-        # Two satellites at each receiver: what is left between them has sqrt(2) times the carrier's sigma.
-        between = star.sigma_m / np.sqrt(2.0) * random.standard_normal((size, len(star.lengths_m) + 1))
-        statistic = np.abs(wrap_m(delay_m + between[:, 1:] - between[:, :1], WAVELENGTH))
-        silent += int((statistic <= star.threshold_m).all(axis=1).sum())
-    return silent
+    return sum(
+        int(_silent(star, delay_m, min(_CHUNK, n_trials - begin), random).sum()) for begin in range(0, n_trials, _CHUNK)
+    )
+
+
+def _silent(star: Star, delay_m: FloatArray, size: int, random: np.random.Generator) -> NDArray[np.bool_]:
+    """Whether no baseline alerts, in so many trials with noise; delays are one for each baseline, or rows of them."""
+    # Two satellites at each receiver: what is left between them has sqrt(2) times the carrier's sigma.
+    between = star.sigma_m / np.sqrt(2.0) * random.standard_normal((size, len(star.lengths_m) + 1))
+    statistic = np.abs(wrap_m(delay_m + between[:, 1:] - between[:, :1], WAVELENGTH))
+    return np.asarray((statistic <= star.threshold_m).all(axis=1), dtype=np.bool_)
 
 
 # --- the study
@@ -183,19 +204,68 @@ def _monte_carlo(star: Star, worst: float, n_trials: int, random: np.random.Gene
     return farthest, np.stack([gradients, counts / n_trials, expected], axis=-1)
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Sweep:
+    """What a star detects over a range of gradients.
+
+    Attributes
+    ----------
+    gradients, missed : (n,) arrays
+        Gradients, in the middles of equal steps [m/m], and P_md of each.
+    p_false_alarm : float
+        That any baseline alerts without a gradient.
+    detected_percent : float
+        Mean of 1 - P_md [%].
+    simulated_percent : float
+        Share that is detected of random gradients, anywhere in the range, with random noise [%].
+    deviation_percent : float
+        Standard deviation of `simulated_percent` [%].
+    """
+
+    gradients: FloatArray
+    missed: FloatArray
+    p_false_alarm: float
+    detected_percent: float
+    simulated_percent: float
+    deviation_percent: float
+
+
+def sweep(
+    star: Star, gradient_range: tuple[float, float], steps: int, n_trials: int, random: np.random.Generator
+) -> Sweep:
+    """Sweep a range of gradients, by the integral and by Monte Carlo."""
+    low, high = gradient_range
+    gradients = low + (np.arange(steps) + 0.5) * (high - low) / steps
+    missed = silent_probability(star, gradients)
+    share = 1.0 - float(missed.mean())
+    return Sweep(
+        gradients=gradients,
+        missed=missed,
+        p_false_alarm=1.0 - float(silent_probability(star, np.zeros(1))[0]),
+        detected_percent=100.0 * share,
+        simulated_percent=100.0 * _detected_share(star, gradient_range, n_trials, random),
+        deviation_percent=100.0 * float(np.sqrt(max(share * (1.0 - share), 1.0 / n_trials) / n_trials)),
+    )
+
+
+def _detected_share(
+    star: Star, gradient_range: tuple[float, float], n_trials: int, random: np.random.Generator
+) -> float:
+    detected = 0
+    for begin in range(0, n_trials, _CHUNK):
+        size = min(_CHUNK, n_trials - begin)
+        delay_m = random.uniform(*gradient_range, size)[:, np.newaxis] * np.asarray(star.lengths_m)
+        detected += size - int(_silent(star, delay_m, size, random).sum())
+    return detected / n_trials
+
+
 def _bed_items(bed: Star, n_trials: int, random: np.random.Generator) -> list[Value | Claim]:
     """How often gradients anywhere in the range are detected at the test bed, against the coverage of the intervals."""
-    gradients = random.uniform(_LOW, _HIGH, n_trials)
-    between = bed.sigma_m / np.sqrt(2.0) * random.standard_normal((n_trials, len(bed.lengths_m) + 1))
-    delay_m = gradients[:, np.newaxis] * np.asarray(bed.lengths_m)
-    alerts = (np.abs(wrap_m(delay_m + between[:, 1:] - between[:, :1], WAVELENGTH)) > bed.threshold_m).any(axis=1)
-    detected = 100.0 * float(alerts.mean())
-    middles = _LOW + (np.arange(4_000) + 0.5) * (_HIGH - _LOW) / 4_000
-    expected = 100.0 * (1.0 - float(silent_probability(bed, middles).mean()))
+    swept = sweep(bed, GRADIENT_RANGE, 4000, n_trials, random)
+    detected, expected = swept.simulated_percent, swept.detected_percent
     monitors = [BaselineMonitor(length_m=length, sigma_m=bed.sigma_m) for length in bed.lengths_m]
     coverage = coverage_percent(monitors, K)
-    share = expected / 100.0
-    allowed = _FARTHEST * 100.0 * float(np.sqrt(share * (1.0 - share) / n_trials))
+    allowed = _FARTHEST * swept.deviation_percent
     return [
         Value(
             name="Test bed, gradients detected",

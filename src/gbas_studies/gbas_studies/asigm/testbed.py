@@ -23,7 +23,7 @@ RECEIVERS_ECEF_M: Final = np.array(
 """RR1 to RR3. Source: table 1."""
 
 RUNWAY_BEARING_DEG: Final = 84.73
-"""True bearing of runway 08 at Braunschweig-Wolfsburg. Not in the paper; from its aeronautical chart."""
+"""True bearing of runway 08. Not in the paper; as in the suite's configuration of the site (course 264.73)."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
