@@ -4,7 +4,7 @@ Observations come from the multiple signal messages (MSM4 to MSM7) of GPS and Ga
 1045 and 1046. The parser is sidereon. Whatever cannot be understood is refused with a :class:`RtcmError` that names the
 file; whatever is left out of the result is said in `notes`.
 
-Source: RTCM 10403.3, 3.5.16 (multiple signal messages) and 3.5.9 to 3.5.11 (ephemerides).
+Source: RTCM 10403.3, messages 1005, 1006, 1019, 1045, 1046, 1074 to 1077 and 1094 to 1097.
 """
 
 from gbas_core.rtcm.ephemerides import read_rtcm_navigation

@@ -55,8 +55,8 @@ class RawEphemeris:
     body : sidereon ephemeris
         Its fields as integers.
 
-    Source: RTCM 10403.3, tables 3.5-21 (1019), 3.5-108 and 3.5-109 (1045, 1046); the scales are those of IS-GPS-200N
-    tables 20-I and 20-III and of the Galileo OS SIS ICD 2.1, tables 58, 60 and 71.
+    Source: RTCM 10403.3, messages 1019, 1045 (F/NAV) and 1046 (I/NAV); the scales are those of IS-GPS-200N tables 20-I
+    and 20-III and of the Galileo OS SIS ICD 2.1.
     """
 
     message: NavigationMessage

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any, Final
@@ -40,7 +41,10 @@ _NOT_READ: Final = (*range(1001, 1005), 1071, 1072, 1073, 1091, 1092, 1093)
 
 @dataclass(frozen=True, kw_only=True)
 class _Resolution:
-    """Scales of one kind of MSM. Source: RTCM 10403.3, DF400 to DF408 and DF401, DF405, DF406."""
+    """Scales of one kind of MSM.
+
+    Source: RTCM 10403.3, DF400, DF401 and DF403 (MSM4 and 5); DF405, DF406 and DF408 (MSM6 and 7).
+    """
 
     code_ms: float
     phase_ms: float
@@ -214,7 +218,7 @@ class _Cells:
             rough_ms, rough_mps = satellites[signal.satellite_id]
             phase_ms = _sum(rough_ms, signal.fine_phase_range, resolution.phase_invalid, resolution.phase_ms)
             cell = (msm.system, signal.satellite_id, signal.signal_id)
-            lli = self._lli(cell, lock.lli, bool(signal.half_cycle_ambiguity), has_carrier=phase_ms == phase_ms)
+            lli = self._lli(cell, lock.lli, bool(signal.half_cycle_ambiguity), has_carrier=math.isfinite(phase_ms))
             tracking = sidereon.rtcm_msm_signal_rinex_code(msm.system, signal.signal_id)
             place = places.get((msm.system, f"C{tracking}"))
             satellite = SAT_INDEX.get(f"{msm.system}{signal.satellite_id:02d}")
