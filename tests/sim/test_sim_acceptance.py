@@ -15,6 +15,7 @@ import pytest
 from gbas_airborne.params import AirborneParams
 from gbas_bringup.resources import config_path, resources
 from gbas_bringup.run_config import read_run_config
+from gbas_core.frames import geodetic_from_ecef
 from gbas_core.gpstime import epoch_key
 from gbas_core.recording import RecordedEpoch
 from gbas_core.rinex import read_navigation, read_observations
@@ -99,43 +100,63 @@ def in_air(refractivity: float, **changes) -> dict:
     return sections(ground={"atmosphere": air}, interval_s=1.0, **IDEAL, **changes)
 
 
+def vertical_and_lateral(result: Flown) -> np.ndarray:
+    """Errors (epochs, 2) that s_vert and s_lat are for: above the path, with those along it, and to the left [m]."""
+    slope = math.tan(result.world.params.flight.approach.gpa_rad)
+    return np.stack([result.error_m[:, 2] + slope * result.error_m[:, 0], result.error_m[:, 1]], axis=-1)
+
+
+def projected(solution: SolutionEpoch, range_m: np.ndarray) -> np.ndarray:
+    """Vertical and lateral error (2,) of errors of ranges [m]."""
+    used = np.isfinite(solution.s_vert)
+    return np.array([np.sum((each * range_m)[used]) for each in (solution.s_vert, solution.s_lat)])
+
+
+def slant(elevation_rad: np.ndarray) -> np.ndarray:
+    """Obliquity of the troposphere, ICAO Annex 10."""
+    return 1.0 / np.sqrt(0.002 + np.sin(elevation_rad) ** 2)
+
+
 def test_with_all_errors_off_the_chain_gives_the_truth_along_the_whole_approach():
     """Below 1 cm from the intercept at 20 km to the threshold, with no air at all.
 
-    The station has to broadcast some: the least are 16 N over a scale height of 100 m, which the aircraft corrects
-    though they are not there: 1.6 mm at the zenith, 16 mm at 5 degrees, the same sign for all satellites.
+    A station has to broadcast some: the least are 16 N over a scale height of 100 m, which the aircraft corrects though
+    they are not there: 1.6 mm at the zenith, 16 mm at 5 degrees. Without that, less than a millimetre is left.
     """
     result = flown(in_air(16.0, air={"scale_height_m": 100.0}, troposphere={"refractivity": 0.0}))
     assert np.abs(result.error_m).max() < 0.01
+    station_m = result.world.params.station.ecef_m
+    height_m = [geodetic_from_ecef(np.array((each.x_m, each.y_m, each.z_m)))[2] for each in result.solutions]
+    above = -np.expm1(-(np.array(height_m) - geodetic_from_ecef(np.array(station_m))[2]) / 100.0)
+    zenith_m = 16e-6 * 100.0 * above
+    corrected = [
+        projected(each, zenith * slant(each.elevation_rad))
+        for each, zenith in zip(result.solutions, zenith_m, strict=True)
+    ]
+    # Corrections stand still, and so does their rounding.
+    np.testing.assert_allclose(vertical_and_lateral(result), corrected, atol=0.001)
 
 
 def test_in_air_what_remains_is_the_difference_of_elevations():
-    """In the air of the site the error is centimetres, and what is left without it is below 1 cm all the way.
+    """In the air of the site errors are centimetres; the elevations explain them to the rounding of the messages.
 
     Station and aircraft see a satellite at elevations that differ by their distance over the Earth's radius; for that
-    there is no correction in the standard. With s_vert and s_lat the differences give the errors of the position.
+    the standard has no correction.
     """
     result = flown(in_air(379.0))
-    approach = result.world.params.flight.approach
-    along, left, up = result.error_m.T
-    vertical = up + math.tan(approach.gpa_rad) * along
-    expected = np.array([elevation_errors_m(result.world, each) for each in result.solutions])
-    assert 0.03 < np.abs(vertical).max() < 0.15
-    np.testing.assert_allclose(np.stack([vertical, left], axis=-1), expected, atol=0.01)
-
-
-def elevation_errors_m(world: World, solution: SolutionEpoch) -> np.ndarray:
-    """Vertical and lateral error (2,) of the air over the station, seen at the aircraft's elevations less its own [m].
-
-    Zenith delay N h_0, obliquity 1 / sqrt(0.002 + sin^2 E), as in ICAO Annex 10.
-    """
-    number = round(solution.tow_s - world.params.start_tow_s)
-    ground = world.elevations_rad(number)[:4]
-    slant = [1.0 / np.sqrt(0.002 + np.sin(each) ** 2) for each in (solution.elevation_rad, ground)]
-    air = world.params.troposphere
-    range_m = 1e-6 * air.refractivity * air.scale_height_m * (slant[0] - slant[1].mean(axis=0))
-    used = np.isfinite(solution.s_vert)
-    return np.array([np.sum((projection * range_m)[used]) for projection in (solution.s_vert, solution.s_lat)])
+    errors = vertical_and_lateral(result)
+    assert 0.03 < np.abs(errors[:, 0]).max() < 0.15
+    expected, rounding = [], []
+    air = result.world.params.troposphere
+    for each in result.solutions:
+        seen = result.world.elevations_rad(round(each.tow_s - result.world.params.start_tow_s))[:4]
+        difference = slant(each.elevation_rad) - slant(seen).mean(axis=0)
+        expected.append(projected(each, 1e-6 * air.refractivity * air.scale_height_m * difference))
+        rounding.append([np.sqrt(np.nansum(weights**2)) for weights in (each.s_vert, each.s_lat)])
+    # Corrections come in steps of 1 cm: 0.01 / sqrt(12) each, 3 mm in the vertical. Five times that.
+    left = (errors - expected) / (0.01 / np.sqrt(12.0) * np.array(rounding))
+    assert np.abs(left).max() < 5.0
+    assert np.sqrt((left**2).mean()) < 1.3  # rounding of neighbours in time is alike
 
 
 def test_rtklib_finds_the_aircraft_from_exported_files(tmp_path):
@@ -411,6 +432,8 @@ def test_an_ephemeris_fault_is_broadcast():
              "duration_s": 60.0},
             r"fault frozen: receiver 'airborne' is not there; there are rr1, rr2, rr3, rr4",
         ),
+        ({"threats": 3}, r"sim\.threats = 3 is not a section"),
+        ({"flight": ["climb"]}, r"sim\.flight = \['climb'\] is not a section"),
         ({"ionosphere": {"sigma": 1.0}}, r"sim\.ionosphere\.sigma is unknown"),
         ({"ionosphere": {"sigma_vig": -1.0}}, r"sim\.ionosphere: ionosphere: sigma_vig = -1\.0 is not within"),
         ({"scintillation": {"equatorial_s4": 2.0}}, r"scintillation: equatorial_s4 = 2\.0 is not within 0 to 1"),

@@ -254,9 +254,11 @@ def _section(flat: Mapping[str, Any], prefix: str) -> dict[str, Any]:
 def _world(ground: dict[str, Any], sim: dict[str, Any]) -> WorldParams:
     if not ground:
         raise ValueError("section 'ground' is missing: there is no site")
+    if plain := [name for name in _SECTIONS if sim.get(name) is not None]:
+        raise ValueError(f"sim.{plain[0]} = {sim[plain[0]]!r} is not a section")
     parts = {name: _section(sim, f"{name}.") for name in _SECTIONS}
-    plain = {key: value for key, value in sim.items() if key.partition(".")[0] not in parts}
-    given = {key: _value(f"sim.{key}", value, _WORLD_KEYS | _OTHER_KEYS) for key, value in plain.items()}
+    others = {key: value for key, value in sim.items() if key.partition(".")[0] not in parts}
+    given = {key: _value(f"sim.{key}", value, _WORLD_KEYS | _OTHER_KEYS) for key, value in others.items()}
     aircraft, approach = given.pop("aircraft", True), given.pop("approach", None)
     receivers = {name: _receiver(name, parts[name], given.get("interval_s", 0.5)) for name in _RECEIVERS}
     optional = {
