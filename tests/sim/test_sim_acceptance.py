@@ -174,6 +174,34 @@ def test_rtklib_finds_the_aircraft_from_exported_files(tmp_path):
     assert np.median(positions["n_sats"]) >= 16  # both systems
 
 
+ORBITS = {
+    "YUMA": ({"almanac": "almanacs/test_input_yuma377.txt"}, "G", None, 0.05),
+    "SEM": ({"almanac": "almanacs/test_input_sem387.txt"}, "G", None, 0.05),
+    # Recorded records follow one another, decimetres apart, and RTKLIB may take the one before or after the truth.
+    "RINEX 2": ({"navigation": "static_pair_L1L2_1h_2010/brdc0770.10n.gz"}, "G", (1575, 363_600.0), 1.0),
+    "RINEX 3": ({"navigation": "static_pair_L1L5_2024/base.nav.gz"}, "GE", (2320, 116_400.0), 1.0),
+    "RINEX 4": ({"navigation": "nav_rinex4_2026/BRD400DLR_S_20260680000_01D_MN.rnx.gz"}, "GE", (2409, 129_600.0), 1.0),
+}
+
+
+@pytest.mark.parametrize("source", ORBITS)
+def test_rtklib_finds_the_aircraft_with_any_source_of_orbits(tmp_path, data_dir, source):
+    rtklib = pytest.importorskip("rtklib_dgnss")
+    files, systems, start, bound_m = ORBITS[source]
+    start = {} if start is None else {"start_week": start[0], "start_tow_s": start[1]}
+    orbits = {key: str(data_dir / name) for key, name in files.items()}
+    world = opened(constellation=orbits, systems=systems, interval_s=10.0, duration_s=40.0, **start, **NOTHING)
+    made = export(world, tmp_path / "files")
+    positions = rtklib.rtklib_positions(
+        None, made.observations[-1], [made.navigation], tmp_path, systems=systems, troposphere=False, ionosphere=False
+    )
+    truth = {epoch.key: epoch.truth.position_m for epoch in world}
+    errors = np.array([xyz - truth[int(key)] for key, xyz in zip(positions["key"], positions["xyz_m"], strict=True)])
+    assert len(errors) == len(world)
+    assert np.abs(errors).max() < bound_m
+    assert np.median(positions["n_sats"]) >= 7
+
+
 # --- files
 
 
