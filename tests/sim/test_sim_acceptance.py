@@ -466,6 +466,11 @@ def test_an_ephemeris_fault_is_broadcast():
         ({"ionosphere": {"sigma_vig": -1.0}}, r"sim\.ionosphere: ionosphere: sigma_vig = -1\.0 is not within"),
         ({"scintillation": {"equatorial_s4": 2.0}}, r"scintillation: equatorial_s4 = 2\.0 is not within 0 to 1"),
         ({"ground_receiver": {"preset": "gad_z"}}, r"sim\.ground_receiver: receiver: preset = 'gad_z' is not one of"),
+        ({"airborne_receiver": {"preset": "aad_b", "cn0": {"antena": "patch"}}}, r"cn0\.antena is unknown; known are "),
+        (
+            {"airborne_receiver": {"preset": "aad_b", "cn0": {"antenna": "dish"}}},
+            r"sim\.airborne_receiver.*antenna = 'dish' is not one of isotropic, mla, patch, fighter",
+        ),
         ({"ground_receiver": {"preset": "gad_c", "noise_scale": 0.0}}, r"noise_scale is unknown with a preset"),
         ({"constellation": {"rinex": "a"}}, r"sim\.constellation\.rinex is unknown; known are almanac, navigation"),
         ({"constellation": {"almanac": "none.alm"}}, r"none\.alm"),
