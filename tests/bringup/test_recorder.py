@@ -16,6 +16,7 @@ from typing import Any
 
 import pytest
 import rclpy
+import yaml
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -183,6 +184,9 @@ def test_interrupt_keeps_everything(source: Source, recorder: Any, wait_until: A
     assert document["configuration"] == ["site.yaml"]
     assert document["lost_in_transport"] == 0
     assert info(process.out).metadata["gbas.configuration"]["site.yaml"] == config.read_text()
+    assert info(process.out).metadata["gbas.end"]["data"] == "simulated"
+    written = yaml.safe_load((process.out / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+    assert written["custom_data"]["data"] == "simulated"  # where `ros2 bag info` shows it
     assert check(process.out).ok
 
 

@@ -21,6 +21,7 @@ from gbas_core.error_models import (
 from gbas_core.satellites import N_GPS, N_SATS
 from gbas_core.signals import L1, L5
 from gbas_core.smoothing import SmoothingParams, initial_smoothing, smooth_step
+from gbas_sim.antenna import LinkBudget
 from gbas_sim.multipath import smoothing_gain
 from gbas_sim.presets import PRESETS, TAU_S, airborne_receiver, ground_receiver, receiver_preset
 from gbas_sim.receiver_model import IDEAL, ReceiverErrors, ReceiverModel
@@ -112,10 +113,18 @@ def test_airborne_ranges_have_sigma_air_at_2_hz(designator):
     check_airborne(designator, interval_s=0.5, epochs=50_000, seed=14, largest=0.05)
 
 
-@pytest.mark.parametrize("name", ["gad_a", "gad_b", "gad_c", "aad_a", "aad_b"])
-def test_parts_add_to_the_curve_at_2_hz(name):
+@pytest.mark.parametrize(
+    ("name", "link"),
+    [
+        *((name, None) for name in ("gad_a", "gad_b", "gad_c", "aad_a", "aad_b")),
+        ("gad_b", LinkBudget(antenna="patch", loss_db=3.0)),
+        ("aad_b", LinkBudget(antenna="fighter")),
+    ],
+)
+def test_parts_add_to_the_curve_at_2_hz(name, link):
     """Thermal noise and each error through the filter's exact gain (test_multipath.py): the standard's curve."""
-    model = receiver_preset(name)
+    model = receiver_preset(name, cn0=link)
+    assert link is None or model.cn0 == link
     degrees = np.array([5.0, 6.0, 9.0, 20.0, 34.0, 36.0, 60.0, 90.0])
     elevation = np.radians(degrees)[:, np.newaxis] * np.ones(N_SATS)
     thermal = noise_sigmas(model.tracking, model.cn0.cn0_dbhz(elevation)).code_m[:, L1, 0]

@@ -297,11 +297,12 @@ def info(path: Path) -> BagInfo:
         first_ns=first_ns,
         last_ns=last_ns,
         epochs=tuple(sorted(observed)),
-        origin=_origin(origins),
+        origin=origin_of(origins),
     )
 
 
-def _origin(origins: set[bool | None]) -> str:
+def origin_of(origins: set[bool | None]) -> str:
+    """What observation tables say they are, all of them: simulated, recorded, both or unknown."""
     known = origins - {None}
     if not known:
         return "unknown"

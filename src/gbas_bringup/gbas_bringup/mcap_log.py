@@ -320,13 +320,15 @@ class BagWriter:
             self.log = fresh
             old.abandon()
 
-    def close(self, metadata: Mapping[str, Mapping[str, str]] | None = None) -> Mapping[str, int]:
-        """End the recording; returns messages by topic."""
+    def close(
+        self, metadata: Mapping[str, Mapping[str, str]] | None = None, *, custom: Mapping[str, str] | None = None
+    ) -> Mapping[str, int]:
+        """End the recording, with more ``custom_data`` if there is some; returns messages by topic."""
         self._stop.set()
         if self._thread.is_alive():
             self._thread.join()
         span = self.log.close(metadata)
-        information = rosbag2_metadata(self._path.name, self.log.topics, span, self._custom)
+        information = rosbag2_metadata(self._path.name, self.log.topics, span, self._custom | dict(custom or {}))
         _write_atomically(self.folder / METADATA_FILE, _yaml({"rosbag2_bagfile_information": information}))
         return dict(span.by_topic)
 

@@ -21,7 +21,14 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 from gbas_bringup import __version__, epochs
-from gbas_bringup.bags import CONFIGURATION_METADATA, END_METADATA, MAIN_CONFIGURATION, SUITE_METADATA
+from gbas_bringup.bags import (
+    CONFIGURATION_METADATA,
+    END_METADATA,
+    MAIN_CONFIGURATION,
+    SUITE_METADATA,
+    origin_of,
+    simulated_column,
+)
 from gbas_bringup.capture import Capture, Taken
 from gbas_bringup.data_time import DataTime
 from gbas_bringup.definitions import definition, qos_record
@@ -126,6 +133,13 @@ def suite_metadata(command: str, config_files: Sequence[str]) -> dict[str, dict[
     }
 
 
+def _simulated(data: bytes) -> bool | None:
+    try:
+        return simulated_column(data)
+    except epochs.PayloadError:
+        return None
+
+
 class Recording:
     """Puts messages into a bag: names their time, counts what the transport lost, holds what came before any time."""
 
@@ -137,6 +151,7 @@ class Recording:
         self.lost: dict[str, int] = {}
         self._held: list[Taken] | None = [] if data_time else None
         self._data_time = data_time
+        self._simulated: dict[str, bool | None] = {}
         self._types: dict[str, str] = {}
         self._numbers: dict[str, int] = {}
 
@@ -155,6 +170,13 @@ class Recording:
             self._write(message, key)
         if key is not None and is_observation(message.topic):
             self.newest_epoch = key if self.newest_epoch is None else max(self.newest_epoch, key)
+            if message.topic not in self._simulated:
+                self._simulated[message.topic] = _simulated(message.data)
+
+    @property
+    def origin(self) -> str:
+        """Whether the observations are simulated, by the first of each receiver."""
+        return origin_of(set(self._simulated.values()))
 
     def _write(self, message: Taken, key: int | None) -> None:
         timed = self._data_time and key is not None
@@ -299,14 +321,15 @@ class Recorder(GbasNode):
     def finish(self) -> None:
         """Take what is on its way and close the bag."""
         self._capture.stop(_QUIET_S, _DRAIN_LIMIT_S)
-        lost = self._recording.lost
+        lost, origin = self._recording.lost, self._recording.origin
         end = {
+            "data": origin,
             "reason": "failed" if self.exit_code else "ended",
             "lost": str(sum(lost.values())),
             "lost_by_topic": ", ".join(f"{name} {count}" for name, count in sorted(lost.items())),
         }
         try:
-            counts = self._recording.writer.close({END_METADATA: end})
+            counts = self._recording.writer.close({END_METADATA: end}, custom={"data": origin})
         except OSError as error:
             if self.exit_code is None:
                 print(f"{NODE_NAME}: {self.params.out}: {error}", file=sys.stderr, flush=True)

@@ -20,13 +20,16 @@ from numpy.typing import ArrayLike
 
 from gbas_core.record import FloatArray
 from gbas_core.satellites import IS_GPS, N_SATS
-from gbas_core.signals import L1, L5, N_BANDS
+from gbas_core.signals import L1, L2, L5, N_BANDS, WAVELENGTH_M
 from gbas_sim.bounds import all_within, one_of
 
 Beam = Literal["isoflux", "paper"]
 
 _REFERENCE_K: Final = 290.0
 _BOLTZMANN_DBWPKHZ: Final = 10.0 * math.log10(1.380649e-23)
+# Uncertain, ours: from the antenna to the edge of the roof it is on.
+_ROOF_EDGE_M: Final = 2.0
+_WAVELENGTHS_M: Final[FloatArray] = np.where(np.arange(N_BANDS) == L2, np.nan, WAVELENGTH_M)
 _EARTH_RADIUS_M: Final = 6_378_137.0
 _ORBIT_RADIUS_M: Final[FloatArray] = np.where(IS_GPS, 26_559_700.0, 29_599_800.0)
 # Known: oxygen, at the zenith, and the height of its shell over the Earth's radius. Source: Sabatini et al., eq (16),
@@ -127,6 +130,29 @@ def oxygen_loss_db(elevation_rad: ArrayLike) -> FloatArray:
     height = _OXYGEN_HEIGHT
     path = sine + np.sqrt(sine**2 + 2.0 * height + height**2)
     return np.asarray(2.0 * _OXYGEN_ZENITH_DB * (1.0 + 0.5 * height) / path)
+
+
+def airframe_loss_db(antenna_elevation_rad: FloatArray) -> FloatArray:
+    """What an airframe takes from satellites below the antenna's plane, ``(..., N_BANDS, N_SATS)`` [dB]; NaN on L2.
+
+    Diffraction over the edge of the roof the antenna is on, beyond what it is for a satellite in the antenna's plane,
+    which the antenna's pattern has. On L1, 6.5 dB at 10 degrees below, 11 dB at 20, 17 dB at 45.
+
+    Parameters
+    ----------
+    antenna_elevation_rad : (..., N_SATS) array
+        Above the antenna's plane [rad].
+
+    Source: Recommendation ITU-R P.526-15, 4.1, eq (26) and (31), with the satellite far away.
+    """
+    below = np.maximum(-antenna_elevation_rad, 0.0)[..., np.newaxis, :]
+    depth = np.sin(below) * np.sqrt(2.0 * _ROOF_EDGE_M / _WAVELENGTHS_M[:, np.newaxis])
+    return np.asarray(_knife_edge_db(depth) - _knife_edge_db(np.zeros(1)))
+
+
+def _knife_edge_db(depth: FloatArray) -> FloatArray:
+    """Loss behind a knife edge, the parameter of diffraction at least -0.7 [dB]."""
+    return np.asarray(6.9 + 20.0 * np.log10(np.sqrt((depth - 0.1) ** 2 + 1.0) + depth - 0.1))
 
 
 def slant_range_m(elevation_rad: FloatArray) -> FloatArray:

@@ -157,6 +157,11 @@ class Window:
         """What messages call it."""
         return f"fault {self.kind}"
 
+    @property
+    def weakens(self) -> bool:
+        """Whether it takes C/N0, so that a signal may be lost."""
+        return False
+
     def active(self, since_s: FloatArray) -> BoolArray:
         """Whether the fault is there at times."""
         return np.asarray((since_s >= self.start_s) & (since_s < self.end_s))

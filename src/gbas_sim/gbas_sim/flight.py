@@ -92,6 +92,9 @@ class StraightIn:
         ecef_velocity: FloatArray = velocity @ self.approach.rot_approach_ecef
         return self.approach.ecef_from_approach(np.stack([x, zero, height], axis=-1)), ecef_velocity
 
+    def antenna_axis(self, since_start_s: ArrayLike) -> None:
+        """None: the antenna always points straight up."""
+
     def _profile(self, distance_m: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Height [m] and slope over the distance to the threshold; half a cosine joins descent and level flight."""
         steepest = math.tan(self.approach.gpa_rad)

@@ -14,6 +14,7 @@ the surrogates of :mod:`gbas_core.error_models`. Correlation times are ours and 
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Final, get_args
 
 import numpy as np
@@ -61,11 +62,14 @@ _AIRBORNE_NOISE_S: Final = 10.0
 # Uncertain, ours: multipath of the carrier over that of the code.
 _CARRIER_SHARE: Final = 0.003
 
+_SITE_LINK: Final = LinkBudget(antenna="mla")
+_AIRFRAME_LINK: Final = LinkBudget(antenna="patch")
+
 _DEGREES: Final[FloatArray] = np.arange(91.0)
 _Targets = tuple[FloatArray, FloatArray, FloatArray]
 
 
-def receiver_preset(name: str, *, interval_s: float = 0.5) -> ReceiverModel:
+def receiver_preset(name: str, *, interval_s: float = 0.5, cn0: LinkBudget | None = None) -> ReceiverModel:
     """The receiver of a name in :data:`PRESETS`.
 
     Parameters
@@ -73,20 +77,28 @@ def receiver_preset(name: str, *, interval_s: float = 0.5) -> ReceiverModel:
     name : str
     interval_s : float
         Between epochs [s]: the smoothing filter averages more of them when it is shorter.
+    cn0 : LinkBudget, optional
+        Another antenna or other powers than the preset's; the curves stay the same.
 
     Raises
     ------
     ValueError
-        For an unknown name.
+        For an unknown name, or when thermal noise alone is above the curve.
     """
     one_of("receiver", "preset", name, PRESETS)
     kind, _, letter = name.partition("_")
     designator = letter.upper()
     if kind == "ideal":
-        return IDEAL
+        return IDEAL if cn0 is None else replace(IDEAL, cn0=cn0)
+    link = default_link(name) if cn0 is None else cn0
     if kind == "gad":
-        return ground_receiver(designator, interval_s=interval_s)  # type: ignore[arg-type]  # from PRESETS
-    return airborne_receiver(designator, interval_s=interval_s)  # type: ignore[arg-type]
+        return ground_receiver(designator, interval_s=interval_s, cn0=link)  # type: ignore[arg-type]  # from PRESETS
+    return airborne_receiver(designator, interval_s=interval_s, cn0=link)  # type: ignore[arg-type]
+
+
+def default_link(name: str) -> LinkBudget:
+    """The link budget of a preset: antennas of reference stations limit multipath, the aircraft has a patch."""
+    return _SITE_LINK if name.startswith("gad") else _AIRFRAME_LINK
 
 
 def ground_receiver(
@@ -95,6 +107,7 @@ def ground_receiver(
     interval_s: float = 0.5,
     multipath_s: float = _SITE_MULTIPATH_S,
     common_s: float = _SITE_COMMON_S,
+    cn0: LinkBudget = _SITE_LINK,
 ) -> ReceiverModel:
     """A reference receiver of a ground accuracy designator.
 
@@ -105,6 +118,7 @@ def ground_receiver(
         Between epochs [s].
     multipath_s, common_s : float
         Correlation times of the receiver's own error and of the common one [s].
+    cn0 : LinkBudget
 
     Raises
     ------
@@ -114,7 +128,7 @@ def ground_receiver(
     one_of("reference receiver", "designator", designator, get_args(GroundAccuracy))
     model = ReceiverModel(
         tracking=TrackingParams(),
-        cn0=LinkBudget(antenna="mla"),
+        cn0=cn0,
         oscillator=OSCILLATORS["ocxo"],
     )
     own, common = _ground_targets(designator)
@@ -132,6 +146,7 @@ def airborne_receiver(
     interval_s: float = 0.5,
     noise_s: float = _AIRBORNE_NOISE_S,
     multipath_s: float = _AIRFRAME_MULTIPATH_S,
+    cn0: LinkBudget = _AIRFRAME_LINK,
 ) -> ReceiverModel:
     """An airborne receiver of an airborne accuracy designator, on an airframe.
 
@@ -142,6 +157,7 @@ def airborne_receiver(
         Between epochs [s].
     noise_s, multipath_s : float
         Correlation times of noise beyond thermal noise and of airframe multipath [s].
+    cn0 : LinkBudget
 
     Raises
     ------
@@ -151,7 +167,7 @@ def airborne_receiver(
     one_of("airborne receiver", "designator", designator, get_args(AirborneAccuracy))
     model = ReceiverModel(
         tracking=TrackingParams(code_bandwidth_hz=0.5, carrier_bandwidth_hz=18.0),
-        cn0=LinkBudget(antenna="patch"),
+        cn0=cn0,
         oscillator=OSCILLATORS["tcxo_good"],
     )
     noise = _airborne_sigma(AAD_A if designator == "A" else AAD_B)

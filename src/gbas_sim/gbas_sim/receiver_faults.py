@@ -118,6 +118,10 @@ class NoiseBurst(ReceiverFault):
         if self.code_m == self.carrier_m == self.drop_db == 0.0:
             raise ValueError(f"{self.owner}: code_m, carrier_m and drop_db are all 0: nothing would happen")
 
+    @property
+    def weakens(self) -> bool:
+        return self.drop_db > 0.0
+
     def add_to(self, effect: SignalEffect, moment: Moment, draw: Draw) -> None:
         hit = (self.active(moment.since_s) & self.theirs(moment))[..., np.newaxis] & self.hit
         if not hit.any():

@@ -24,6 +24,7 @@ from gbas_core.observations import ObservationEpoch
 from gbas_core.record import FloatArray
 from gbas_core.satellites import IS_GPS, N_SATS
 from gbas_core.signals import IONO_RATIO, L1, L5, N_BANDS, SPEED_OF_LIGHT_MPS, WAVELENGTH_M
+from gbas_sim.arcs import IntArray, jumps
 from gbas_sim.oscillators import ClockState
 from gbas_sim.paths import Delay
 from gbas_sim.random_processes import Normals
@@ -165,9 +166,16 @@ class WhiteErrors:
         """Clocks less system time and their rates, (R,) each."""
         return ClockState(self._offset_s + self._drift * (self._interval_s * epoch), self._drift)
 
-    def cn0_dbhz(self, elevation_rad: FloatArray, *, change_db: FloatArray | float = 0.0) -> FloatArray:
+    def cn0_dbhz(
+        self,
+        elevation_rad: FloatArray,
+        *,
+        antenna_elevation_rad: FloatArray | None = None,
+        change_db: FloatArray | float = 0.0,
+    ) -> FloatArray:
         """C/N0 ``(R, N_BANDS, N_SATS)`` [dB-Hz]; NaN on L2."""
-        return np.asarray(cn0_dbhz(self._params, elevation_rad) + change_db)
+        seen = elevation_rad if antenna_elevation_rad is None else antenna_elevation_rad
+        return np.asarray(cn0_dbhz(self._params, seen) + change_db)
 
     def tracked(self, elevation_rad: FloatArray, cn0: FloatArray) -> NDArray[np.bool_]:
         """Signals ``(R, N_BANDS, N_SATS)`` above the mask and the weakest C/N0 that is tracked."""
@@ -197,6 +205,8 @@ class Arrivals(NamedTuple):
     cn0_dbhz, elevation_rad : (R, N_BANDS, N_SATS) and (R, N_SATS) arrays
     tracked, tracked_before : (R, N_BANDS, N_SATS) bool arrays
         In this epoch and in the one before.
+    arcs : (R, N_BANDS, N_SATS) int array
+        Numbers of the carriers' arcs, see :mod:`gbas_sim.arcs`.
     """
 
     lines: Sightlines
@@ -208,6 +218,7 @@ class Arrivals(NamedTuple):
     elevation_rad: FloatArray
     tracked: NDArray[np.bool_]
     tracked_before: NDArray[np.bool_]
+    arcs: IntArray
 
 
 class ReceiverBank:
@@ -226,8 +237,6 @@ class ReceiverBank:
     ----------
     numbers : tuple of int
     errors : WhiteErrors or ReceiverErrors
-    ambiguity_m : (R, N_BANDS, N_SATS) array
-        Whole wavelengths in each carrier [m].
     """
 
     def __init__(
@@ -238,7 +247,15 @@ class ReceiverBank:
         self.errors = model(kind, seed=seed, numbers=numbers, interval_s=interval_s)  # type: ignore[arg-type]
         shape, largest = (N_BANDS, N_SATS), _LARGEST_AMBIGUITY
         cycles = [_generator(seed, Stream.AMBIGUITY, number).integers(-largest, largest, shape) for number in numbers]
-        self.ambiguity_m = np.array(cycles) * WAVELENGTH_M[:, np.newaxis]
+        self._seed, self._first_arcs = seed, np.array(cycles)
+        self._counted: tuple[IntArray, FloatArray] | None = None
+
+    def ambiguity_m(self, arcs: IntArray) -> FloatArray:
+        """Whole wavelengths in each carrier, by the numbers of their arcs, (R, N_BANDS, N_SATS) [m]."""
+        if self._counted is None or not np.array_equal(self._counted[0], arcs):
+            cycles = self._first_arcs + jumps(self._seed, self.numbers, arcs)
+            self._counted = (arcs, cycles * WAVELENGTH_M[:, np.newaxis])
+        return self._counted[1]
 
     def observe(
         self, *, gps_week: int, tow_s: float, epoch: int, clock: ClockState, group_delay_s: FloatArray, seen: Arrivals
@@ -266,7 +283,7 @@ class ReceiverBank:
         tracked = seen.tracked & np.isfinite(pseudorange)
         values = {
             "code_m": pseudorange + delay + seen.code_m + errors.code_m,
-            "carrier_m": pseudorange - delay + seen.carrier_m + self.ambiguity_m + errors.carrier_m,
+            "carrier_m": pseudorange - delay + seen.carrier_m + self.ambiguity_m(seen.arcs) + errors.carrier_m,
             "doppler_hz": -rate / WAVELENGTH_M[:, np.newaxis] + errors.doppler_hz,
             "cn0_dbhz": errors.cn0_dbhz,
             "lli": np.where(seen.tracked_before, 0.0, 1.0),

@@ -55,6 +55,7 @@ from gbas_core.approach import FinalApproach
 from gbas_core.approach_keys import approach_from_mapping
 from gbas_core.frames import ecef_from_geodetic
 from gbas_core.rinex import RinexError
+from gbas_sim.antenna import LinkBudget
 from gbas_sim.bounds import one_of
 from gbas_sim.faults import RECEIVER_FAULTS, SATELLITE_FAULTS
 from gbas_sim.flight import StraightIn
@@ -63,7 +64,7 @@ from gbas_sim.fronts import PlasmaBubble, WedgeFront
 from gbas_sim.ionosphere import IonosphereParams
 from gbas_sim.keys import keys_of, record_from_keys
 from gbas_sim.oscillators import OSCILLATORS
-from gbas_sim.presets import receiver_preset
+from gbas_sim.presets import default_link, receiver_preset
 from gbas_sim.receiver_model import ReceiverModel
 from gbas_sim.receivers import AIRBORNE_RECEIVER, GROUND_RECEIVER, ReceiverParams
 from gbas_sim.scintillation import ScintillationParams
@@ -90,7 +91,7 @@ _SITE_TROPOSPHERE: Final = {
 }
 _DYNAMIC: Final = ("aircraft", "configuration", "mass_kg", "planned_wind", "profile", "segments", "start", "wind")
 PRESET_KEYS: Final = (
-    "cn0_sigma_db", "elevation_mask_deg", "hardware", "oscillator", "preset", "rinex_steps", "tracking",
+    "cn0", "cn0_sigma_db", "elevation_mask_deg", "hardware", "oscillator", "preset", "rinex_steps", "tracking",
 )  # fmt: skip
 THREATS: Final[dict[str, tuple[type[Any], str]]] = {
     "front": (WedgeFront, "fronts"),
@@ -254,9 +255,11 @@ def _section(flat: Mapping[str, Any], prefix: str) -> dict[str, Any]:
 def _world(ground: dict[str, Any], sim: dict[str, Any]) -> WorldParams:
     if not ground:
         raise ValueError("section 'ground' is missing: there is no site")
+    if plain := [name for name in _SECTIONS if sim.get(name) is not None]:
+        raise ValueError(f"sim.{plain[0]} = {sim[plain[0]]!r} is not a section")
     parts = {name: _section(sim, f"{name}.") for name in _SECTIONS}
-    plain = {key: value for key, value in sim.items() if key.partition(".")[0] not in parts}
-    given = {key: _value(f"sim.{key}", value, _WORLD_KEYS | _OTHER_KEYS) for key, value in plain.items()}
+    others = {key: value for key, value in sim.items() if key.partition(".")[0] not in parts}
+    given = {key: _value(f"sim.{key}", value, _WORLD_KEYS | _OTHER_KEYS) for key, value in others.items()}
     aircraft, approach = given.pop("aircraft", True), given.pop("approach", None)
     receivers = {name: _receiver(name, parts[name], given.get("interval_s", 0.5)) for name in _RECEIVERS}
     optional = {
@@ -365,7 +368,7 @@ def _receiver(name: str, section: dict[str, Any], interval_s: float) -> Receiver
         return record_from_keys(ReceiverParams, defaults | section, path)
     if unknown := sorted(key for key in section if key.partition(".")[0] not in PRESET_KEYS):
         raise ValueError(f"{path}{unknown[0]} is unknown with a preset; known are {', '.join(PRESET_KEYS)}")
-    parts = {part: _section(section, f"{part}.") for part in ("tracking", "hardware")}
+    parts = {part: _section(section, f"{part}.") for part in ("cn0", "tracking", "hardware")}
     kinds: dict[str, type] = {"cn0_sigma_db": float, "elevation_mask_deg": float, "rinex_steps": bool}
     kinds |= {"oscillator": str, "preset": str}
     plain = {key: value for key, value in section.items() if key.partition(".")[0] not in parts}
@@ -376,7 +379,10 @@ def _receiver(name: str, section: dict[str, Any], interval_s: float) -> Receiver
         if "oscillator" in values:
             one_of("receiver", "oscillator", values["oscillator"], OSCILLATORS)
             values["oscillator"] = OSCILLATORS[values["oscillator"]]
-        preset = receiver_preset(values.pop("preset"), interval_s=interval_s)
+        preset_name, link = values.pop("preset"), parts.pop("cn0")
+        known = keys_of(default_link(preset_name), "")
+        cn0 = record_from_keys(LinkBudget, known | link, f"{path}cn0.") if link else None
+        preset = receiver_preset(preset_name, interval_s=interval_s, cn0=cn0)
         for part, keys in parts.items():
             inner = getattr(preset, part)
             values[part] = record_from_keys(type(inner), keys_of(inner, "") | keys, f"{path}{part}.")

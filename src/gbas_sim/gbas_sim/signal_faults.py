@@ -132,6 +132,10 @@ class LowPower(SatelliteFault):
             raise ValueError(f"{self.owner}: drop_db and ramp_dbps are both 0: nothing would happen")
         _check_bands(self.owner, self.bands)
 
+    @property
+    def weakens(self) -> bool:
+        return True
+
     def add_to(self, effect: SignalEffect, moment: Moment) -> None:
         weaker = np.minimum(self.drop_db + self.ramp_dbps * (moment.since_s - self.start_s), self.largest_db)
         for band in self.bands:

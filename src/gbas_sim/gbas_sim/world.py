@@ -23,11 +23,14 @@ from gbas_core.orbits import SatelliteState, group_delay_s
 from gbas_core.record import FloatArray
 from gbas_core.satellites import N_SATS, SAT_INDEX, satellites_of
 from gbas_core.signals import L2, N_BANDS
+from gbas_sim.antenna import airframe_loss_db
+from gbas_sim.arcs import Breaks, IntArray, Passes, arc_numbers
 from gbas_sim.broadcast import Arc, Orbits, almanac_orbits, nominal_orbits, recorded_orbits
 from gbas_sim.faults import (
     RECEIVERS,
     FrozenOutput,
     Listener,
+    LossOfLock,
     Moment,
     OrbitFault,
     ReceiverFault,
@@ -58,6 +61,8 @@ LONGEST_S: Final = 7.0 * 86_400.0
 _EARTH_SURFACE_M: Final = (6.3e6, 6.5e6)
 _FARTHEST_M: Final = 20_000.0
 _INSTANTS_KEPT: Final = 6
+_PASSES_S: Final = 300.0
+"""Satellites that set for less may be found with the carrier they had."""
 
 
 class FlightPath(Protocol):
@@ -70,6 +75,10 @@ class FlightPath(Protocol):
 
     def state(self, since_start_s: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Position and velocity ``(..., 3)``, ECEF [m], [m/s], at times since the start ``(...)`` [s]."""
+        ...
+
+    def antenna_axis(self, since_start_s: ArrayLike) -> FloatArray | None:
+        """Where the antenna points, unit vectors ``(..., 3)``, ECEF, at times; None is straight up at all of them."""
         ...
 
 
@@ -250,7 +259,10 @@ class SimulatedEpoch:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Instant:
-    """Where everything is at one time tag and what arrives; reference receivers first, the aircraft last."""
+    """Where everything is at one time tag and what arrives; reference receivers first, the aircraft last.
+
+    Signals are ``unbroken`` that are tracked, or not because of a loss of lock that says itself what comes of it.
+    """
 
     gps_week: int
     tow_s: float
@@ -261,6 +273,7 @@ class _Instant:
     elevation_rad: FloatArray
     cn0_dbhz: FloatArray
     tracked: NDArray[np.bool_]
+    unbroken: NDArray[np.bool_]
     effect: SignalEffect | None
 
 
@@ -325,8 +338,32 @@ class World:
         self._scene = self._site_scene()
         self._instants: dict[int, _Instant] = {}
         kinds = (*(params.ground for _ in numbers), *(() if params.flight is None else (params.airborne,)))
+        self._masks_rad = np.array([each.elevation_mask_rad for each in kinds])
+        self._passes = Passes(self.above_masks, max(1, round(_PASSES_S / params.interval_s)))
         self._listeners = tuple(_listener(*each) for each in zip(params.receiver_names, kinds, strict=True))
         check_threats(self)
+
+    def _first_break(self) -> int | None:
+        """Epoch from which a signal in the sky may be lost; None is never."""
+        params = self.params
+        turns = params.flight is not None and params.flight.antenna_axis(0.0) is not None
+        if turns or self._scene is not None or self._scintillation is not None:
+            return 0
+        starts_s = [max(fault.start_s, 0.0) for fault in params.faults if fault.weakens]
+        return math.ceil(min(starts_s) / params.interval_s) if starts_s else None
+
+    @functools.cached_property
+    def _breaks(self) -> Breaks | None:
+        first = self._first_break()
+        return None if first is None else Breaks(self._unbroken, first)
+
+    def _unbroken(self, number: int) -> NDArray[np.bool_]:
+        return self._instant(number).unbroken
+
+    def _arcs(self, number: int) -> IntArray:
+        """Numbers of the carriers' arcs, (R, N_BANDS, N_SATS)."""
+        breaks = None if self._breaks is None else self._breaks.at(number)
+        return arc_numbers(self._passes.at(number), breaks)
 
     def _site_scene(self) -> SiteScene | None:
         params = self.params
@@ -377,7 +414,7 @@ class World:
     def _observations(self, number: int) -> tuple[ObservationEpoch, ...]:
         """What receivers would observe that are not frozen."""
         before, now = self._instant(number - 1), self._instant(number)
-        arrivals = self._arrivals(now, before.tracked)
+        arrivals = self._arrivals(now, before.tracked, self._arcs(number))
         observations: list[ObservationEpoch] = []
         for bank, rows in zip(self._banks, self._rows, strict=True):
             observations += bank.observe(
@@ -406,6 +443,10 @@ class World:
         """Elevations ``(R, N_SATS)`` of the satellites at an epoch, the aircraft's last [rad]."""
         return self._instant(number).elevation_rad
 
+    def above_masks(self, number: int) -> NDArray[np.bool_]:
+        """Satellites above the receivers' masks at an epoch, (R, N_SATS)."""
+        return np.asarray(self.elevations_rad(number) >= self._masks_rad[:, np.newaxis])
+
     def _instant(self, number: int) -> _Instant:
         """The last few are kept, since every epoch needs the one before; what is kept changes nothing."""
         if number not in self._instants:
@@ -428,10 +469,14 @@ class World:
         elevation = np.arcsin(np.clip(paths.sin_elevation, -1.0, 1.0))
         effect = self._effect(number, paths)
         change_db, held = self._disturbed(paths, effect)
+        antenna = self._antenna_elevations_rad(since_s - clock.offset_s, paths, elevation, change_db)
         cn0, tracked = [], []
         for bank, rows in zip(self._banks, self._rows, strict=True):
-            cn0.append(bank.errors.cn0_dbhz(elevation[rows], change_db=change_db[rows]))
-            tracked.append(bank.errors.tracked(elevation[rows], cn0[-1]) & held[rows])
+            strength = bank.errors.cn0_dbhz(
+                elevation[rows], antenna_elevation_rad=antenna[rows], change_db=change_db[rows]
+            )
+            cn0.append(strength)
+            tracked.append(bank.errors.tracked(elevation[rows], strength) & held[rows])
         return _Instant(
             gps_week=week,
             tow_s=tow_s,
@@ -442,8 +487,29 @@ class World:
             elevation_rad=elevation,
             cn0_dbhz=np.concatenate(cn0),
             tracked=np.concatenate(tracked),
+            unbroken=np.concatenate(tracked) | self._lost_knowingly(number),
             effect=effect,
         )
+
+    def _antenna_elevations_rad(
+        self, since_s: FloatArray, paths: SignalPaths, elevation_rad: FloatArray, change_db: FloatArray
+    ) -> FloatArray:
+        """Elevations ``(R, N_SATS)`` above the antennas' planes; takes from `change_db` what the airframe hides."""
+        flight = self.params.flight
+        axis = None if flight is None else flight.antenna_axis(since_s[-1])
+        if axis is None:
+            return elevation_rad
+        own = np.arcsin(np.clip(axis @ paths.los[-1], -1.0, 1.0))
+        change_db[-1] -= airframe_loss_db(own)
+        return np.concatenate([elevation_rad[:-1], own[np.newaxis]])
+
+    def _lost_knowingly(self, number: int) -> NDArray[np.bool_]:
+        """Signals that a fault takes which says what their carriers count from afterwards."""
+        faults = [fault for fault in self._satellite_faults if isinstance(fault, LossOfLock)]
+        if self._breaks is None or not faults:
+            return np.zeros(1, dtype=bool)
+        moment = self._moment(number)
+        return ~signal_effect(faults, moment.since_s, moment.listeners, moment.interval_s).tracked
 
     def _arc(self, week: int, tow_s: float, since_s: float) -> Arc:
         """Orbits around a time, with those that have left what they broadcast."""
@@ -506,7 +572,7 @@ class World:
             change_db += effect.cn0_db
         return change_db, held
 
-    def _arrivals(self, now: _Instant, tracked_before: NDArray[np.bool_]) -> Arrivals:
+    def _arrivals(self, now: _Instant, tracked_before: NDArray[np.bool_], arcs: IntArray) -> Arrivals:
         paths = now.paths
         lines = sightlines(now.arc, now.tow_s, now.clock.offset_s, now.seen, paths.position_m, paths.velocity_mps)
         air = self.params.troposphere.delay(paths)
@@ -527,6 +593,7 @@ class World:
             elevation_rad=now.elevation_rad,
             tracked=now.tracked,
             tracked_before=tracked_before if effect is None else tracked_before & ~effect.slipped,
+            arcs=arcs,
         )
 
 
@@ -576,10 +643,8 @@ def _check_up(world: World, owner: str, satellite: str, start_s: float, end_s: f
     last = min(len(world) - 1, math.floor(min(end_s, params.length_s) / params.interval_s))
     if first > last:
         raise ValueError(f"{owner}: start_s = {start_s:g} is after the end of the run, {params.length_s:g} s")
-    masks_rad = [params.ground.elevation_mask_rad] * len(params.receiver_ecef_m)
-    masks_rad += [params.airborne.elevation_mask_rad] * (params.flight is not None)
     for number in range(first, last + 1, max(1, (last - first) // 40)):
-        if bool((world.elevations_rad(number)[:, index] >= masks_rad).any()):
+        if bool(world.above_masks(number)[:, index].any()):
             return
     raise ValueError(f"{owner}: satellite = {satellite!r} is not up between {max(start_s, 0.0):g} and "
                      f"{min(end_s, params.length_s):g} s")  # fmt: skip

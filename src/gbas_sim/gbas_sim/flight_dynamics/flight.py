@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
-from gbas_core.frames import ecef_from_geodetic, rot_enu_ecef
+from gbas_core.frames import ecef_from_geodetic, geodetic_from_ecef, rot_enu_ecef
 from gbas_core.record import FloatArray
 from gbas_sim.flight_dynamics.aircraft import Aircraft
 from gbas_sim.flight_dynamics.attitude import body_rates, euler_angles, rot_body_enu
@@ -145,6 +145,14 @@ class Flight:
         """
         place, velocity, _ = self._tables.position.derivatives(np.asarray(since_start_s, dtype=np.float64))
         return place + self._tables.origin_m, velocity
+
+    def antenna_axis(self, since_start_s: ArrayLike) -> FloatArray:
+        """Where an antenna on the roof points, unit vectors ``(..., 3)``, ECEF, at times since the start ``(...)``."""
+        value, _, _ = self._tables.flown.derivatives(np.asarray(since_start_s, dtype=np.float64))
+        latitude, longitude, _ = geodetic_from_ecef(value[..., :3] + self._tables.origin_m)
+        climb, heading, bank, alpha = (value[..., column] for column in (_CLIMB, _HEADING, _BANK, _ALPHA))
+        down_enu = rot_body_enu(climb, heading, bank, alpha)[..., 2, :]
+        return np.asarray(-np.einsum("...ji,...j->...i", rot_enu_ecef(latitude, longitude), down_enu))
 
     def flight_state(self, since_start_s: ArrayLike) -> FlightState:
         """All there is to know of the aircraft at times (T,) since the start of the flight [s]."""
