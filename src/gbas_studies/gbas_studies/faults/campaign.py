@@ -20,15 +20,32 @@ import numpy as np
 
 from gbas_ground.monitor_params import MonitorParams
 from gbas_ground.params import GroundParams
-from gbas_sim.faults import FAULT_MODES, CodeCarrierDivergence, ExcessiveAcceleration, LowPower
+from gbas_sim.faults import (
+    FAULT_MODES,
+    CodeCarrierDivergence,
+    ExcessiveAcceleration,
+    FrozenOutput,
+    LowPower,
+    NoiseBurst,
+    OrbitFault,
+    RangeFault,
+)
+from gbas_sim.fronts import WedgeFront
 from gbas_sim.world import WorldParams
 from gbas_studies.ccd.monitors import cmc_rate
-from gbas_studies.ccd.smoothed_error import Smoothing
+from gbas_studies.ccd.smoothed_error import Smoothing, StudyError
 from gbas_studies.faults.exposure import TIME_TO_ALERT_S, divergence_limit_s, extrapolation_limit_s
 from gbas_studies.faults.injection import Reaction, Settled, Threat, inject, settle
 
 QUIET_S: Final = 260.0
 """Before the faults: the filters settle for 230 s."""
+WATCH_S: Final = 120.0
+WORLD_S: Final = QUIET_S + WATCH_S + 10.0
+"""A world long enough for every case [s]."""
+RECEIVER: Final = "rr2"
+"""The reference receiver that has the receivers' faults."""
+
+_SITE_RADIUS_M: Final = 450.0  # reference receivers are within this of the reference point
 
 MakeThreats = Callable[[str, float], tuple[Threat, ...]]
 """Threats of a case from the satellite and the onset [s]."""
@@ -49,13 +66,16 @@ class Case:
         [s].
     watch_s : float
         How long to look [s].
+    subject : str
+        Whose fault it is: a receiver, or the satellite of the trial if empty.
     """
 
     kind: str
     name: str
     threats: MakeThreats
-    limit_s: float
-    watch_s: float = 120.0
+    limit_s: float = math.inf
+    watch_s: float = WATCH_S
+    subject: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,10 +86,8 @@ class Outcome:
     ----------
     case : Case
     trials : int
-    detected : int
-        By the station that acts.
-    detected_s : tuple of float
-        When, sorted, since the onset [s].
+    burst_s : tuple of float
+        Ends of the bursts that told users, sorted, since the onset [s]; one for each fault the acting station found.
     late_s : tuple of float
         Time to alert of each trial: from the passing of the limit to the end of the burst that says so; negative when
         that comes first. Of undetected faults whose error passes the limit: infinite [s].
@@ -81,12 +99,16 @@ class Outcome:
 
     case: Case
     trials: int
-    detected: int
-    detected_s: tuple[float, ...]
+    burst_s: tuple[float, ...]
     late_s: tuple[float, ...]
     causes: Mapping[str, int]
     monitors_s: Mapping[str, tuple[float, ...]]
     false: int
+
+    @property
+    def detected(self) -> int:
+        """Trials in which users were told."""
+        return len(self.burst_s)
 
     @property
     def worst_late_s(self) -> float:
@@ -105,9 +127,10 @@ class Outcome:
             "case": self.case.name,
             "trials": self.trials,
             "detected": self.detected,
-            "detected_s": _spread(self.detected_s),
+            "burst_s": _spread(self.burst_s),
             "limit_s": self.case.limit_s if math.isfinite(self.case.limit_s) else None,
-            "time_to_alert_s": _spread(self.late_s),
+            "time_to_alert_s": _spread([each for each in self.late_s if math.isfinite(each)]),
+            "undetected_beyond_limit": sum(math.isinf(each) for each in self.late_s),
             "in_time": self.in_time,
             "causes": dict(self.causes),
             "monitors_s": {name: {"found": len(times), **_spread(times)} for name, times in self.monitors_s.items()},
@@ -178,16 +201,120 @@ def _acceleration(
 def power_cases() -> Iterator[Case]:
     """Drops of power; they add noise and no error of their own."""
     for drop_db in (3.0, 6.0, 10.0, 20.0):
-        yield Case(
-            kind="low power",
-            name=f"drop {drop_db:g} dB",
-            threats=partial(_low_power, drop_db),
-            limit_s=math.inf,
-        )
+        yield Case(kind="power", name=f"power {drop_db:g} dB lower", threats=partial(_low_power, drop_db))
 
 
 def _low_power(drop_db: float, satellite: str, onset_s: float) -> tuple[Threat, ...]:
     return (LowPower(satellite=satellite, drop_db=drop_db, start_s=onset_s),)
+
+
+def orbit_cases() -> Iterator[Case]:
+    """A satellite that leaves its orbit across the track; the error grows with the distance from the station alone."""
+    for rate_mps in (1.0, 10.0, 100.0):
+        yield Case(kind="orbit", name=f"orbit, {rate_mps:g} m/s across", threats=partial(_orbit, rate_mps))
+
+
+def _orbit(rate_mps: float, satellite: str, onset_s: float) -> tuple[Threat, ...]:
+    return (OrbitFault(satellite=satellite, cross_mps=rate_mps, start_s=onset_s),)
+
+
+def receiver_cases() -> Iterator[Case]:
+    """Faults of one reference receiver; the protection level under its fault bounds them until they are found."""
+    makers: dict[str, MakeThreats] = {
+        "codes 1 m long": partial(_ranges, 1.0, 0.0, ("code_l1", "code_l5")),
+        "codes 5 m long": partial(_ranges, 5.0, 0.0, ("code_l1", "code_l5")),
+        "codes, 0.05 m/s": partial(_ranges, 0.0, 0.05, ("code_l1", "code_l5")),
+        "carriers, 0.05 m/s": partial(_ranges, 0.0, 0.05, ("carrier_l1", "carrier_l5")),
+        "noise of 3 m": _noise,
+        "frozen": _frozen,
+    }
+    for name, maker in makers.items():
+        yield Case(kind="receiver", name=f"one channel or receiver: {name}", threats=maker, subject=RECEIVER)
+
+
+def _ranges(
+    step_m: float, ramp_mps: float, quantities: tuple[str, ...], satellite: str, onset_s: float
+) -> tuple[Threat, ...]:
+    fault = RangeFault(
+        receiver=RECEIVER, satellites=(satellite,), quantities=quantities, step_m=step_m, ramp_mps=ramp_mps,
+        start_s=onset_s,
+    )  # fmt: skip
+    return (fault,)
+
+
+def _noise(satellite: str, onset_s: float) -> tuple[Threat, ...]:
+    return (NoiseBurst(receiver=RECEIVER, satellites=(satellite,), code_m=3.0, start_s=onset_s),)
+
+
+def _frozen(satellite: str, onset_s: float) -> tuple[Threat, ...]:
+    return (FrozenOutput(receiver=RECEIVER, start_s=onset_s),)
+
+
+def front_cases(
+    gradients: Iterable[float] = (300e-6, 425e-6, 600e-6, 860e-6, 1200e-6, 2000e-6),
+    *,
+    speed_mps: float = 100.0,
+    direction_rad: float = 4.62,
+) -> Iterator[Case]:
+    """Fronts over the station, each for one satellite; the limit is passed when the slope covers all receivers."""
+    crossing_s = 2.0 * _SITE_RADIUS_M / speed_mps
+    for gradient in gradients:
+        yield Case(
+            kind="front",
+            name=f"front, {1e6 * gradient:g} mm/km at {speed_mps:g} m/s",
+            threats=partial(_front, gradient, speed_mps, direction_rad),
+            limit_s=crossing_s,
+            watch_s=60.0,
+        )
+
+
+def _front(
+    gradient: float, speed_mps: float, direction_rad: float, satellite: str, onset_s: float
+) -> tuple[Threat, ...]:
+    """A leading edge that touches the first receivers at the onset."""
+    front = WedgeFront(
+        gradient=gradient,
+        width_m=30_000.0,
+        edge="leading",
+        direction_rad=direction_rad,
+        speed_mps=speed_mps,
+        start_m=-_SITE_RADIUS_M,
+        start_s=onset_s,
+        satellites=(satellite,),
+    )
+    return (front,)
+
+
+KINDS: Final = ("divergence", "acceleration", "power", "orbit", "receiver", "front")
+
+
+def cases_of(
+    kinds: Sequence[str], *, rates_mps: Sequence[float] = (0.01, 0.02, 0.05, 0.1), modes: Sequence[str] = ()
+) -> list[Case]:
+    """Cases of these kinds.
+
+    Raises
+    ------
+    StudyError
+        For a kind or mode that there is not.
+    """
+    for mode in modes:
+        if mode not in FAULT_MODES:
+            raise StudyError(f"mode {mode!r} is not one of: {'; '.join(FAULT_MODES)}")
+    makers: dict[str, Callable[[], Iterator[Case]]] = {
+        "divergence": partial(divergence_cases, rates_mps, modes or tuple(FAULT_MODES)),
+        "acceleration": acceleration_cases,
+        "power": power_cases,
+        "orbit": orbit_cases,
+        "receiver": receiver_cases,
+        "front": front_cases,
+    }
+    cases: list[Case] = []
+    for kind in kinds:
+        if kind not in makers:
+            raise StudyError(f"kind {kind!r} is not one of {', '.join(KINDS)}")
+        cases += makers[kind]()
+    return cases
 
 
 def run_campaign(
@@ -196,7 +323,7 @@ def run_campaign(
     cases: Sequence[Case],
     *,
     trials: int,
-    watching: MonitorParams | None = None,
+    watch: bool = False,
     workers: int = 1,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> list[Outcome]:
@@ -210,8 +337,8 @@ def run_campaign(
     cases : sequence of Case
     trials : int
         Of each case.
-    watching : MonitorParams, optional
-        Monitors that exclude nothing; without them the station that only watches is left out.
+    watch : bool
+        Also a station whose monitors exclude nothing.
     workers : int
         Processes. The outcome does not depend on how many.
     progress : callable
@@ -219,30 +346,44 @@ def run_campaign(
 
     Raises
     ------
-    ValueError
+    StudyError
         When the world is too short, or the station has no usable satellite after the quiet start.
     """
     longest = max((case.watch_s for case in cases), default=0.0)
     if world.length_s < QUIET_S + longest + 1.0:
         needed_s = QUIET_S + longest + 1.0
-        raise ValueError(f"the world is {world.length_s:g} s long, and the longest case needs {needed_s:g} s")
+        raise StudyError(f"the world is {world.length_s:g} s long, and the longest case needs {needed_s:g} s")
     acting = settle(world, station, QUIET_S)
     if not acting.usable:
-        raise ValueError("the station has no usable satellite after the quiet start")
+        raise StudyError("the station has no usable satellite after the quiet start")
     stations = [acting]
-    if watching is not None:
-        stations.append(settle(world, replace(station, monitors=watching), QUIET_S))
+    if watch:
+        stations.append(settle(world, replace(station, monitors=_watching(station.monitors)), QUIET_S))
     outcomes: list[Outcome] = []
     if workers == 1:
         for case in cases:
             outcomes.append(_run_case(stations, trials, case))
             progress(len(outcomes), len(cases))
         return outcomes
-    with ProcessPoolExecutor(workers, mp_context=get_context("fork")) as pool:
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
         for outcome in pool.map(partial(_run_case, stations, trials), cases, chunksize=4):
             outcomes.append(outcome)
             progress(len(outcomes), len(cases))
     return outcomes
+
+
+def _watching(monitors: MonitorParams) -> MonitorParams:
+    """The same monitors, with none that excludes."""
+    return replace(
+        monitors,
+        ccd=replace(monitors.ccd, exclude=False),
+        ccd_f=replace(monitors.ccd_f, exclude="none"),
+        acceleration=replace(monitors.acceleration, exclude=False),
+        gradient=replace(monitors.gradient, exclude=False),
+        ephemeris=replace(monitors.ephemeris, exclude=False),
+        power=replace(monitors.power, exclude=False),
+        sigma=replace(monitors.sigma, exclude=False),
+    )
 
 
 def _run_case(stations: Sequence[Settled], trials: int, case: Case) -> Outcome:
@@ -253,8 +394,9 @@ def _run_case(stations: Sequence[Settled], trials: int, case: Case) -> Outcome:
         satellite = acting.usable[trial % len(acting.usable)]
         onset_s = acting.time_s + interval_s * (1.0 + (trial + 1) * 0.6180339887498949 % 1.0)
         threats = case.threats(satellite, onset_s)
-        reactions.append(inject(acting, threats, satellite, onset_s, case.watch_s))
-        watched += [inject(each, threats, satellite, onset_s, case.watch_s) for each in stations[1:]]
+        subject = case.subject or satellite
+        reactions.append(inject(acting, threats, subject, onset_s, case.watch_s))
+        watched += [inject(each, threats, subject, onset_s, case.watch_s) for each in stations[1:]]
     return _outcome(case, reactions, watched)
 
 
@@ -267,8 +409,7 @@ def _outcome(case: Case, reactions: Sequence[Reaction], watched: Sequence[Reacti
     return Outcome(
         case=case,
         trials=len(reactions),
-        detected=len(found),
-        detected_s=tuple(sorted(each.burst_s for each in found)),
+        burst_s=tuple(sorted(each.burst_s for each in found)),
         late_s=tuple(sorted(late)),
         causes=Counter(each.cause for each in found),
         monitors_s={name: tuple(sorted(r.failed_s[name] for r in watched if name in r.failed_s)) for name in names},

@@ -68,7 +68,7 @@ class Reaction:
         Epoch at which the satellite or receiver first was no longer used.
     burst_s : float
         End of the slot of the first burst after the onset from which a user no longer gets a valid correction of the
-        satellite: the moment the alert has arrived.
+        satellite, or gets corrections without the receiver's channel: the moment the alert has arrived.
     cause : str
         Word of the first exclusion, or ``""``.
     value, threshold : float
@@ -149,7 +149,7 @@ def inject(settled: Settled, threats: tuple[Threat, ...], subject: str, onset_s:
         if since_s >= 0.0 and subject in SAT_INDEX:
             for name in _failing(monitored, subject):
                 failed_s.setdefault(name, since_s)
-        if math.isnan(burst_s) and since_s >= 0.0 and subject in SAT_INDEX and not _sent_as_valid(bursts, subject):
+        if since_s >= 0.0 and _told(subject, monitored, bursts):
             burst_s = since_s + _end_of_slots_s(bursts)
         if math.isfinite(burst_s):
             break
@@ -184,6 +184,13 @@ def _steps(
 def _usable(monitored: Monitored) -> Iterator[str]:
     used = np.isfinite(monitored.integrity.prc_100_m)
     return (name for name, index in SAT_INDEX.items() if used[index])
+
+
+def _told(subject: str, monitored: Monitored, bursts: tuple[Burst, ...]) -> bool:
+    """Whether users are told in this frame: no valid correction of the satellite, or none with the receiver in it."""
+    if subject in SAT_INDEX:
+        return not _sent_as_valid(bursts, subject)
+    return any(event.kind == EventKind.EXCLUSION and _concerns(event.subject, subject) for event in monitored.events)
 
 
 def _failing(monitored: Monitored, satellite: str) -> Iterator[str]:
