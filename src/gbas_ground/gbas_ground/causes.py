@@ -66,6 +66,9 @@ class ExclusionCause(IntEnum):
     SIGMA_SPREAD = 47
     """The spread of B values over time does not fit the broadcast sigma."""
 
+    COMMON_SLIP = 48
+    """Several receivers lost count of the carrier at one epoch."""
+
     @property
     def word(self) -> str:
         """The cause as it stands in an event."""

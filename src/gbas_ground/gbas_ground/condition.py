@@ -34,7 +34,6 @@ def conclude(
     measured: Measured,
     made: Corrections,
     exclusions: Exclusions,
-    judged: BoolArray,
     params: GroundParams,
 ) -> Condition:
     """Condition of every satellite; of several reasons against its use the first in the list below is told.
@@ -43,17 +42,15 @@ def conclude(
     ----------
     tracked : (R, N) bool array
         Channels with code and carrier.
-    judged : (N,) bool array
-        Satellites that every required monitor of signals could judge.
     """
     seen = tracked.any(axis=0)
     visible = measured.elevation_rad >= params.elevation_mask_rad
     usable = exclusions.usable_channels()
-    ready = (usable & measured.settled).sum(axis=0)
-    settling = (usable & np.isfinite(tracks.age_s) & ~measured.settled).sum(axis=0)
+    ready = (usable & measured.ready).sum(axis=0)
+    settling = (usable & np.isfinite(tracks.age_s) & ~measured.ready).sum(axis=0)
     short = made.count < params.min_receivers
     waiting = short & (ready < params.min_receivers) & (ready + settling >= params.min_receivers)
-    unmonitored = waiting & ~judged & _has_settled(tracks, usable, params)
+    unmonitored = waiting & ~measured.judged & ((usable & measured.settled).sum(axis=0) >= params.min_receivers)
     channel_cause = _channel_cause(tracked, exclusions)
     no_rate = ~np.isfinite(made.prc_m + made.rrc_mps).all(axis=0)
 
@@ -79,12 +76,6 @@ def conclude(
             state = np.where(mask, its_state, state)
             cause = np.where(mask, its_cause, cause)
     return Condition(state=state, cause=cause)
-
-
-def _has_settled(tracks: Tracks, usable: BoolArray, params: GroundParams) -> BoolArray:
-    """Satellites that enough smoothing filters have settled for, ``(N,)``."""
-    settled = usable & (tracks.age_s >= params.settle_time_s)
-    return np.asarray(settled.sum(axis=0) >= params.min_receivers)
 
 
 def _channel_cause(tracked: BoolArray, exclusions: Exclusions) -> FloatArray:

@@ -38,7 +38,9 @@ class Measured:
     dt_s : float
         Time since then [s]; NaN when there was none.
     settled : (R, N) bool array
-        Channels that may be used unless something excludes them.
+        Channels whose smoothing filters have run long enough.
+    judged : (N,) bool array
+        Satellites that every required monitor of signals could judge.
     elevation_rad : (N,) array
     """
 
@@ -46,7 +48,13 @@ class Measured:
     previous_m: FloatArray
     dt_s: float
     settled: BoolArray
+    judged: BoolArray
     elevation_rad: FloatArray
+
+    @property
+    def ready(self) -> BoolArray:
+        """Channels that may be used unless something excludes them, ``(R, N)``."""
+        return self.settled & self.judged
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -115,7 +123,7 @@ class Finding:
 
 def form_corrections(measured: Measured, exclusions: Exclusions, params: GroundParams) -> Corrections:
     """Corrections from everything that is not excluded."""
-    usable = measured.settled & exclusions.usable_channels()
+    usable = measured.ready & exclusions.usable_channels()
     in_use, common = form.common_satellites(
         usable & ~exclusions.satellites.excluded,
         min_common=params.min_common_satellites,
@@ -326,9 +334,9 @@ def _together(measured: Measured, made: Corrections, channel_ok: BoolArray, para
     tracked = np.logical_or.reduce(channel_ok, axis=0)
     stuck = ~np.logical_or.reduce(made.common, axis=1) & np.logical_or.reduce(tracked & CLOCK_GROUPS, axis=1)
     if stuck.any():
-        trial = form_corrections(
-            replace(measured, settled=measured.settled & channel_ok), no_exclusions(params), params
-        )
+        # Monitors that average over receivers could judge nothing while all of these were excluded.
+        free = replace(measured, settled=measured.settled & channel_ok, judged=np.ones_like(measured.judged))
+        trial = form_corrections(free, no_exclusions(params), params)
         results = [b_value_check(trial, params).failed.any(axis=0), *(r.failed for _, r in limit_checks(trial, params))]
         failed = np.logical_or.reduce(np.concatenate(results), axis=0)
         for k, group in enumerate(CLOCK_GROUPS):

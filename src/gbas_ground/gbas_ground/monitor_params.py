@@ -123,11 +123,11 @@ class AccelerationSection(Declared):
     """Step, rate and acceleration of the carriers."""
 
     exclude: bool = parameter("acceleration", "exclude", True, "-", "satellites and channels that fail are excluded")
-    window_s: float = parameter("acceleration", "window_s", 5.0, "s", "oldest epoch in the fit", low=1.0, high=60.0)
+    window_s: float = parameter("acceleration", "window_s", 5.0, "s", "oldest epoch in the fit", low=1.0, high=600.0)
     points: int = parameter("acceleration", "points", 10, "-", "most epochs in the fit", low=4, high=120)
     least_points: int = parameter("acceleration", "least_points", 5, "-", "fewest epochs in it", low=4, high=120)
     min_satellites: int = parameter(
-        "acceleration", "min_satellites", 4, "-", "others a receiver's clock is taken from", low=2, high=35
+        "acceleration", "min_satellites", 3, "-", "others a receiver's clock is taken from", low=2, high=35
     )
     common: tuple[float, float, float] = parameter(
         "acceleration", "common", CarrierAccelerationParams.common, "m, m/s, m/s2",
@@ -186,7 +186,9 @@ class PowerSection(Declared):
     channel_margin_db: float = parameter(
         "power", "channel_margin_db", 4.0, "dB", "a single channel may be this much lower", low=0.0, high=40.0
     )
-    average_s: float = parameter("power", "average_s", 1.5, "s", "time constant of the average", low=0.1, high=600.0)
+    average_s: float = parameter(
+        "power", "average_s", PowerExpectationParams.average_s, "s", "time constant of the average", low=0.1, high=600.0
+    )
     learn: bool = parameter("power", "learn", False, "-", "let what the receivers saw raise the minimum")
 
     def __post_init__(self) -> None:
@@ -285,7 +287,14 @@ class CarrierNoiseSection(Declared):
         high=1.0,
     )
     scale_rad: float = parameter(
-        "carrier_noise", "scale_deg", 17.0, "deg", "elevation over which it falls", low=1.0, high=90.0, per_unit=_DEGREE
+        "carrier_noise",
+        "scale_deg",
+        math.degrees(CarrierNoise.scale_rad),
+        "deg",
+        "elevation over which it falls",
+        low=1.0,
+        high=90.0,
+        per_unit=_DEGREE,
     )
 
     def params(self) -> CarrierNoise:

@@ -311,8 +311,23 @@ def _process(
     correction = range_correction_m(should.range_m, tracks.smoothed_m, should.clock_s)
     settled = _settled(tracks, correction, should, params)
     channel_ok = tracked & ~np.logical_or.reduce([check.failed for _, check in checks])
-    shift_m = _shift_m(state, epoch, should, changed, clean, site)
-    seen = _seen(clean, tracks, should, channel_ok, settled, known, new_exclusions, changed, shift_m, dt_s, params)
+    usable = channel_ok & new_exclusions.usable_channels()
+    due = ((usable & settled).sum(axis=0) >= params.min_receivers) & np.isfinite(known.crc)
+    seen = Seen(
+        code_m=clean.code_m,
+        carrier_m=tracks.carrier_m,
+        cn0_dbhz=clean.cn0_dbhz,
+        slipped=tracks.slipped,
+        usable=usable & ~new_exclusions.satellites.excluded,
+        ready=usable & settled,
+        in_use=state.satellites == ChannelState.USABLE,
+        due=due,
+        may_refer=due & ~new_exclusions.satellites.excluded,
+        expected=should,
+        rebased=changed,
+        shift_m=_shift_m(state, epoch, should, changed, clean, site),
+        dt_s=dt_s,
+    )
     watching, watched = watch(state.watching, seen, params)
     new_exclusions = _exclude_channels(new_exclusions, watched.channels, events)
     new_exclusions, noticed = _exclude_satellites(new_exclusions, watched)
@@ -322,7 +337,8 @@ def _process(
             state.before if dt_s <= params.max_gap_s else None, known.current, changed, correction.shape, site
         ),
         dt_s=dt_s,
-        settled=settled & watched.ready,
+        settled=settled,
+        judged=watched.ready,
         elevation_rad=should.elevation_rad,
     )
     made, new_exclusions, findings = agree(measured, new_exclusions, params)
@@ -333,7 +349,7 @@ def _process(
         new_exclusions, measured, made, channel_ok, watched.passed, dt_s, params
     )
 
-    condition = conclude(tracked, tracks, known, measured, made, new_exclusions, watched.ready, params)
+    condition = conclude(tracked, tracks, known, measured, made, new_exclusions, params)
     integrity = integrity_of(epoch.gps_week, epoch.tow_s, known, measured, made, condition)
     channels = channel_epoch(
         epoch.gps_week, epoch.tow_s, tracked, tracks, measured, made, condition, new_exclusions, state.channels
@@ -467,39 +483,6 @@ def _exclude_receivers(
         cause = ExclusionCause.RECEIVER_FAULT.word
         events.add(EventKind.EXCLUSION, f"rr{row + 1}", cause, failures[row], params.receiver_fault_channels)
     return replace(exclusions, receivers=exclude(exclusions.receivers, failed, ExclusionCause.RECEIVER_FAULT))
-
-
-def _seen(
-    raw: RawEpoch,
-    tracks: Tracks,
-    should: Expected,
-    channel_ok: BoolArray,
-    settled: BoolArray,
-    known: EphemerisState,
-    exclusions: Exclusions,
-    changed: BoolArray,
-    shift_m: FloatArray,
-    dt_s: float,
-    params: GroundParams,
-) -> Seen:
-    """What the monitors of signals are given."""
-    usable = channel_ok & exclusions.usable_channels()
-    ready = usable & settled
-    due = (ready.sum(axis=0) >= params.min_receivers) & np.isfinite(known.crc)
-    return Seen(
-        code_m=raw.code_m,
-        carrier_m=tracks.carrier_m,
-        cn0_dbhz=raw.cn0_dbhz,
-        slipped=tracks.slipped,
-        usable=usable & ~exclusions.satellites.excluded,
-        ready=ready,
-        due=due,
-        may_refer=due & ~exclusions.satellites.excluded,
-        expected=should,
-        rebased=changed,
-        shift_m=shift_m,
-        dt_s=dt_s,
-    )
 
 
 def _shift_m(

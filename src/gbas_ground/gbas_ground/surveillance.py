@@ -30,6 +30,7 @@ from gbas_ground.monitors.carrier_acceleration import (
     initial_carrier_acceleration,
 )
 from gbas_ground.monitors.code_carrier_divergence import CcdParams, ccd_step, initial_ccd
+from gbas_ground.monitors.common_slip import check_common_slip
 from gbas_ground.monitors.divergence_classification import MODES, NO_FAULT, classify
 from gbas_ground.monitors.double_difference import (
     DoubleDifferences,
@@ -90,6 +91,8 @@ class Seen(NamedTuple):
         Channels that are tracked and that nothing excludes, nor their satellite.
     ready : (R, N) bool array
         Channels whose smoothing filter has settled, and whose receiver is not excluded either.
+    in_use : (N,) bool array
+        Satellites that were broadcast at the epoch before.
     due : (N,) bool array
         Satellites that would be broadcast if nothing else were against it.
     may_refer : (N,) bool array
@@ -109,6 +112,7 @@ class Seen(NamedTuple):
     slipped: BoolArray
     usable: BoolArray
     ready: BoolArray
+    in_use: BoolArray
     due: BoolArray
     may_refer: BoolArray
     expected: Expected
@@ -248,7 +252,7 @@ def watch(state: WatchState, seen: Seen, params: GroundParams) -> tuple[WatchSta
     power, expectation = _power(
         state.power, seen, settings, exclude=sections.power.exclude, required=params.require_cn0
     )
-    parts = (divergence, two_frequency, carrier, gradient, orbit, expectation)
+    parts = (_common_slip(seen), divergence, two_frequency, carrier, gradient, orbit, expectation)
     ready = np.ones_like(seen.due)
     for part in parts:
         if part.ready is not None:
@@ -262,6 +266,15 @@ def watch(state: WatchState, seen: Seen, params: GroundParams) -> tuple[WatchSta
     )
     state = WatchState(ccd=ccd, ccd_f=ccd_f, acceleration=acceleration, ephemeris=ephemeris, power=power)
     return state, watched
+
+
+def _common_slip(seen: Seen) -> _Part:
+    """A satellite that steps has no settled filters any more, so `due` does not have it."""
+    tracked = np.isfinite(seen.code_m[:, L1] + seen.carrier_m[:, L1])
+    result = check_common_slip(seen.slipped[:, L1], tracked, seen.in_use)
+    return _Part(
+        looks={"common_slip": look(result, seen.in_use)}, satellites=(Verdict(ExclusionCause.COMMON_SLIP, result),)
+    )
 
 
 def _ccd(state: DivergenceState, seen: Seen, settings: _Settings, *, exclude: bool) -> tuple[DivergenceState, _Part]:

@@ -25,6 +25,7 @@ GROUND_MONITORS = (
     "acceleration",
     "carrier_rate",
     "carrier_step",
+    "common_slip",
     "ephemeris",
     "b_value",
     "prc",

@@ -13,6 +13,7 @@ business but the executive's (:mod:`gbas_ground.executive`).
 :mod:`~.sigma_monitor`               mean and variance of the B values over time
 :mod:`~.correction_limits`           size of PRC and RRC
 :mod:`~.carrier_acceleration`        step, rate and acceleration of the carrier
+:mod:`~.common_slip`                 carriers several receivers lose count of at once
 :mod:`~.ionosphere_gradient`         double-difference carriers: gradients of the ionosphere
 :mod:`~.ephemeris_residual`          double-difference carriers: the orbit, and the P a site can claim
 :mod:`~.ephemeris_change`            a new ephemeris against the one before

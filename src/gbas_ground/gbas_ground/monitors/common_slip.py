@@ -1,0 +1,41 @@
+"""Carriers of a satellite that several receivers lose count of at one epoch: then it is the satellite that stepped.
+
+A step of more than a few centimetres restarts the filters of every receiver by itself
+(:mod:`gbas_core.slips`); this says why, and blames the satellite.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gbas_ground.corrections import BoolArray
+from gbas_ground.monitors.result import MonitorResult, upper_limit
+
+_MOST_SHARE = 0.5
+"""When more of the tracked satellites slip at once, it is not the satellites. Ours."""
+
+
+def check_common_slip(slipped: BoolArray, tracked: BoolArray, due: BoolArray) -> MonitorResult:
+    """Count the receivers that lost count.
+
+    Parameters
+    ----------
+    slipped : (R, N) bool array
+        Slips found at this epoch.
+    tracked : (R, N) bool array
+        Channels that are tracked.
+    due : (N,) bool array
+        Satellites that were in use.
+
+    Returns
+    -------
+    MonitorResult
+        Statistic: receivers with a slip; threshold: one.
+
+    Source: ours; slips of receivers are independent, but for interference and scintillation, which end the use of the
+    satellite in any case.
+    """
+    number = (slipped & tracked).sum(axis=0).astype(np.float64)
+    several = number > 1.0
+    most = several.sum() > _MOST_SHARE * max(1, int(tracked.any(axis=0).sum()))
+    return upper_limit(number, 1.0, due & (not most))
