@@ -100,6 +100,13 @@ def test_grids_are_worse_and_optimistic():
     assert found["Three receivers, gradients every 10 mm/km"].ours > 6.982
 
 
+def test_the_papers_grid_for_four_receivers():
+    """Metres, hundredths and 2 mm/km give all that is printed: 8.65 mm, 221 m, 0.28, 0.53."""
+    sigma_mm, *lengths = optima.best_of_grids(2e-6)
+    assert round(sigma_mm, 2) == 8.65
+    assert lengths == [221.0, 0.28, 0.53]
+
+
 def test_fourth_receiver():
     found = items(optima.fourth_receiver_section(BED))
     assert int(found["Fourth receiver, distance from RR1"].ours) == 77

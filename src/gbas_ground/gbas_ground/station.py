@@ -266,9 +266,7 @@ def _monitor(state: MonitorState, epoch: GroundEpoch, params: GroundParams) -> t
         nothing = ChannelEpoch(gps_week=epoch.gps_week, tow_s=epoch.tow_s)
         integrity = empty_integrity(epoch.gps_week, epoch.tow_s)
         statistics = MonitorEpoch(gps_week=epoch.gps_week, tow_s=epoch.tow_s)
-        return refused, Monitored(
-            integrity=integrity, statistics=statistics, channels=nothing, events=events.all()
-        )
+        return refused, Monitored(integrity=integrity, statistics=statistics, channels=nothing, events=events.all())
     return _process(admitted, epoch, params, events)
 
 
@@ -345,9 +343,7 @@ def _process(
     long_term, new_exclusions, slow, slow_looks = watch_sigmas(state.long_term, made, new_exclusions, dt_s, params)
     findings = (*noticed, *findings, *slow)
     events.found(findings)
-    new_exclusions = _advanced(
-        new_exclusions, measured, made, channel_ok, watched.passed, dt_s, params
-    )
+    new_exclusions = _advanced(new_exclusions, measured, made, channel_ok, watched.passed, dt_s, params)
 
     condition = conclude(tracked, tracks, known, measured, made, new_exclusions, params)
     integrity = integrity_of(epoch.gps_week, epoch.tow_s, known, measured, made, condition)

@@ -191,7 +191,9 @@ class SitingProblem:
         slack = self.slack_m - self.width_m(0.5 * (high_m - low_m))
         slope = self.slope_m(0.5 * (low_m + high_m))
         result = worst_gradient(slope, self.wavelength_m, self.gradient_range, slack_m=slack, enough_m=enough_m)
-        return result.statistic_m
+        # No distance to a multiple is more than half a wavelength.
+        bound: FloatArray = np.minimum(result.statistic_m, 0.5 * self.wavelength_m.max())
+        return bound
 
     def monitors(self, new_m: FloatArray, sigma_m: float) -> tuple[BaselineMonitor, ...]:
         """The monitors of one set of places ``(n_new,)``, for coverage and blind intervals."""

@@ -25,10 +25,12 @@ from gbas_ground.siting.problem import SitingProblem
 
 GAP_M: Final = 1.0e-8
 """Of the statistic: 1.3 nm of sigma."""
-BUDGET: Final = 1_000_000
-"""Sets of places and boxes computed before the search ends without closing the gap: some seconds."""
+BUDGET: Final = 6_000_000
+"""Work before the search ends without closing the gap: sets of places and boxes, of four baselines. Some seconds."""
 # Two places are compared by their width over their distance, as if they were this much farther away [m].
 _NEAR_M: Final = 5.0
+_SCATTERED: Final = 2000
+_STARTS: Final = 6
 _POLISH_ROUNDS: Final = 40
 _POLISH_TRIALS: Final = 400
 
@@ -105,6 +107,12 @@ class _Search:
     statistic_m: float = 0.0
     evaluations: int = 0
 
+    @property
+    def work(self) -> float:
+        """In the unit of the budget: every two monitors can meet, and on several bands they take twice as long."""
+        n_bands, n_monitors = len(self.problem.bands), self.problem.wavelength_m.size
+        return self.evaluations * max(1.0, (n_monitors / 4.0) ** 2) * min(n_bands, 2)
+
     def offer(self, new_m: FloatArray) -> bool:
         """Take the best of places ``(n, n_new)`` if they beat what there is."""
         value = self.problem.guaranteed(new_m, enough_m=self.statistic_m).statistic_m
@@ -114,6 +122,20 @@ class _Search:
             return False
         self.best_m, self.statistic_m = new_m[at].copy(), float(value[at])
         return True
+
+    def scatter(self, low_m: FloatArray, high_m: FloatArray) -> None:
+        """Start from several places, the same in every run: a good start spares the search much of its work."""
+        random = np.random.default_rng(2)
+        trials = np.sort(low_m + (high_m - low_m) * random.random((_SCATTERED, low_m.size)) ** 2, axis=1)
+        value = self.problem.guaranteed(trials).statistic_m
+        self.evaluations += value.size
+        best_m, statistic_m = self.best_m, self.statistic_m
+        for start in np.argsort(-value, kind="stable")[:_STARTS]:
+            self.best_m, self.statistic_m = trials[start], float(value[start])
+            self.polish(low_m, high_m, 0.1 * float((high_m - low_m).max()))
+            if self.statistic_m > statistic_m:
+                best_m, statistic_m = self.best_m, self.statistic_m
+        self.best_m, self.statistic_m = best_m, statistic_m
 
     def polish(self, low_m: FloatArray, high_m: FloatArray, scale_m: float) -> None:
         """Try places around the best, nearer each time that none is better; the same trials in every run."""
@@ -133,7 +155,8 @@ def best_siting(problem: SitingProblem, *, gap_m: float = GAP_M, budget: int = B
     gap_m : float
         The search ends when nothing can beat the result by more than this, in the statistic [m].
     budget : int
-        Or when so many sets of places and boxes have been computed: then :attr:`Siting.bound_m` says what is left open.
+        Or after so much work: then :attr:`Siting.bound_m` says what is left open. The unit is one set of places, or one
+        box, of four baselines on one band; more of them take more.
 
     Returns
     -------
@@ -148,6 +171,7 @@ def best_siting(problem: SitingProblem, *, gap_m: float = GAP_M, budget: int = B
         search.offer(np.zeros((1, 0)))
         return _siting(search, search.statistic_m, gap_m)
     search.offer(np.clip(_chain(problem), low, high))
+    search.scatter(low[0], high[0])
     bound = _branch_and_bound(search, low, high, gap_m, budget)
     search.best_m = np.sort(search.best_m)
     return _siting(search, bound, gap_m)
@@ -174,7 +198,7 @@ def _branch_and_bound(search: _Search, low_m: FloatArray, high_m: FloatArray, ga
         if not kept.any():
             return search.statistic_m + gap_m
         low_m, high_m = low_m[kept], high_m[kept]
-        if search.evaluations >= budget:
+        if search.work >= budget:
             return float(bound.max())
         if problem.baselines == "star":
             low_m, high_m = _contracted(problem, low_m, high_m, search.statistic_m + gap_m)
