@@ -22,7 +22,7 @@ from gbas_core.observations import ObservationEpoch
 from gbas_core.orbits import SatelliteState, group_delay_s
 from gbas_core.record import FloatArray
 from gbas_core.satellites import N_SATS, SAT_INDEX, satellites_of
-from gbas_core.signals import L2, N_BANDS
+from gbas_core.signals import L1, L2, L5, N_BANDS
 from gbas_sim.antenna import airframe_loss_db
 from gbas_sim.arcs import Breaks, IntArray, Passes, arc_numbers
 from gbas_sim.broadcast import Arc, Orbits, almanac_orbits, nominal_orbits, recorded_orbits
@@ -566,7 +566,8 @@ class World:
         if self._scintillation is not None:
             scintillation = self._scintillation.epoch(paths, self._numbers)
             held &= ~scintillation.lost[:, np.newaxis]
-            change_db -= np.stack([scintillation.fading_db(band) for band in range(N_BANDS)], axis=1)
+            for band in (L1, L5):
+                change_db[:, band] -= scintillation.fading_db(band)
         if effect is not None:
             held &= effect.tracked
             change_db += effect.cn0_db
