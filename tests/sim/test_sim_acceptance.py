@@ -241,7 +241,11 @@ def test_files_say_that_they_are_simulated(tmp_path):
     files = export(opened(duration_s=1.0), tmp_path)
     for path in (*files.observations, files.navigation, files.truth):
         assert LABEL in path.read_text()
-    assert "simulated" in files.truth.read_text().splitlines()[1]
+    _, names, *lines = files.truth.read_text().splitlines()
+    assert names.endswith("height_m,roll_deg,pitch_deg,heading_deg,simulated")
+    assert all(line.endswith(",1") and line.count(",") == names.count(",") for line in lines)
+    # The course of the approach; meridians of the start, 40 km away, and of the threshold are half a degree apart.
+    assert [float(each) for each in lines[0].split(",")[-4:-1]] == pytest.approx([0.0, 0.0, 264.73], abs=0.6)
     assert read_observations(files.observations[0]).epoch(0).simulated == 1.0
     assert all(each.simulated == 1.0 for each in read_navigation([files.navigation]).received(2400, 216_000.0))
 

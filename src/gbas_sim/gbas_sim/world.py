@@ -81,6 +81,10 @@ class FlightPath(Protocol):
         """Where the antenna points, unit vectors ``(..., 3)``, ECEF, at times; None is straight up at all of them."""
         ...
 
+    def attitude(self, since_start_s: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Roll, pitch and true heading at times [rad]."""
+        ...
+
 
 @dataclass(frozen=True, kw_only=True)
 class WorldParams:
@@ -228,12 +232,17 @@ class Truth:
         Time tag of the epoch.
     position_m, velocity_mps : (3,) arrays
         ECEF [m], [m/s].
+    roll_rad, pitch_rad, heading_rad : float
+        Attitude: right wing down, nose up, true heading clockwise from north.
     """
 
     gps_week: int
     tow_s: float
     position_m: FloatArray
     velocity_mps: FloatArray
+    roll_rad: float
+    pitch_rad: float
+    heading_rad: float
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -400,15 +409,27 @@ class World:
             raise IndexError(f"epoch {number} is not within 0 to {len(self) - 1}")
         now = self._instant(number)
         observations = self._with_frozen(number, self._observations(number))
-        count, truth = len(self._sites_m), None
-        if self.params.flight is not None:
-            position_m, velocity_mps = now.paths.position_m[-1], now.paths.velocity_mps[-1]
-            truth = Truth(gps_week=now.gps_week, tow_s=now.tow_s, position_m=position_m, velocity_mps=velocity_mps)
+        count = len(self._sites_m)
         return SimulatedEpoch(
             key=epoch_key(now.gps_week, now.tow_s),
             ground=observations[:count],
             airborne=observations[count] if len(observations) > count else None,
-            truth=truth,
+            truth=self._truth(number, now),
+        )
+
+    def _truth(self, number: int, now: _Instant) -> Truth | None:
+        if self.params.flight is None:
+            return None
+        since_s = 0.001 * (number * self._interval_ms) - now.clock.offset_s[-1]
+        roll, pitch, heading = self.params.flight.attitude(np.array(since_s))
+        return Truth(
+            gps_week=now.gps_week,
+            tow_s=now.tow_s,
+            position_m=now.paths.position_m[-1],
+            velocity_mps=now.paths.velocity_mps[-1],
+            roll_rad=float(roll),
+            pitch_rad=float(pitch),
+            heading_rad=float(heading),
         )
 
     def _observations(self, number: int) -> tuple[ObservationEpoch, ...]:
