@@ -464,6 +464,7 @@ def test_an_ephemeris_fault_is_broadcast():
              "duration_s": 60.0},
             r"fault frozen: receiver 'airborne' is not there; there are rr1, rr2, rr3, rr4",
         ),
+        ({"systems": "R"}, r"world: systems = 'R' is not G, E or GE"),
         ({"threats": 3}, r"sim\.threats = 3 is not a section"),
         ({"flight": ["climb"]}, r"sim\.flight = \['climb'\] is not a section"),
         ({"ionosphere": {"sigma": 1.0}}, r"sim\.ionosphere\.sigma is unknown"),

@@ -156,9 +156,8 @@ class WorldParams:
         _within("interval_s", self.interval_s, 0.01, 60.0)
         _whole_milliseconds("start_tow_s", self.start_tow_s)
         _whole_milliseconds("interval_s", self.interval_s)
-        if not self.systems or len(set(self.systems)) != len(self.systems):
+        if self.systems not in ("G", "E", "GE", "EG"):
             raise ValueError(f"world: systems = {self.systems!r} is not G, E or GE")
-        satellites_of(self.systems)
         if self.almanac and self.navigation:
             raise ValueError("world: almanac and navigation are both given; orbits have one source")
         self._check_duration()
