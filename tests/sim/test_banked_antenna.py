@@ -79,6 +79,14 @@ def test_antenna_stays_upright_in_level_flight(world):
     np.testing.assert_allclose(np.linalg.norm(axis, axis=-1), 1.0, rtol=1e-12)
 
 
+def test_the_truth_has_the_attitude(world):
+    for number in (5, round(0.5 * FLIGHT.duration_s)):
+        truth, state = world.epoch(number).truth, FLIGHT.flight_state(np.array([float(number)]))
+        # The receiver's clock is a millisecond off at most, and it turns by less than a radian a second.
+        for name in ("roll_rad", "pitch_rad", "heading_rad"):
+            assert getattr(truth, name) == pytest.approx(float(getattr(state, name)[0]), abs=1e-3)
+
+
 def test_cn0_follows_attitude(world):
     """By the antenna's gain at the elevation above its own plane, less what the roof's edge takes."""
     budget = world.params.airborne.cn0

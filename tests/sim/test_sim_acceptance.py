@@ -23,6 +23,7 @@ from gbas_core.satellites import SAT_INDEX
 from gbas_core.signals import IONO_RATIO, L1, L5, WAVELENGTH_M
 from gbas_ground.params import GroundParams
 from gbas_msgs_py.records import SolutionEpoch
+from gbas_sim.batches import observed
 from gbas_sim.rinex_files import LABEL, export
 from gbas_sim.scenario import ScenarioError, open_world, read_sections, scenario_from_mapping, world_from_yaml
 from gbas_sim.world import World
@@ -241,7 +242,11 @@ def test_files_say_that_they_are_simulated(tmp_path):
     files = export(opened(duration_s=1.0), tmp_path)
     for path in (*files.observations, files.navigation, files.truth):
         assert LABEL in path.read_text()
-    assert "simulated" in files.truth.read_text().splitlines()[1]
+    _, names, *lines = files.truth.read_text().splitlines()
+    assert names.endswith("height_m,roll_deg,pitch_deg,heading_deg,simulated")
+    assert all(line.endswith(",1") and line.count(",") == names.count(",") for line in lines)
+    # The course of the approach; meridians of the start, 40 km away, and of the threshold are half a degree apart.
+    assert [float(each) for each in lines[0].split(",")[-4:-1]] == pytest.approx([0.0, 0.0, 264.73], abs=0.6)
     assert read_observations(files.observations[0]).epoch(0).simulated == 1.0
     assert all(each.simulated == 1.0 for each in read_navigation([files.navigation]).received(2400, 216_000.0))
 
@@ -347,6 +352,49 @@ def test_gradient_of_a_front_shows_between_two_receivers():
     codes = values(with_front, 0, "code_m") - values(without, 0, "code_m")
     known = np.isfinite(codes)
     np.testing.assert_allclose(codes[known], delay[known], atol=1e-6)
+
+
+def smoothed(code_m: np.ndarray, carrier_m: np.ndarray, weight: float) -> np.ndarray:
+    """Carrier-smoothed codes, the filter written out; time is the first axis."""
+    result = np.empty_like(code_m)
+    result[0] = code_m[0]
+    for now in range(1, len(code_m)):
+        predicted = result[now - 1] + carrier_m[now] - carrier_m[now - 1]
+        result[now] = weight * code_m[now] + (1.0 - weight) * predicted
+    return result
+
+
+def test_a_stationary_front_and_an_approaching_aircraft():
+    """Observations of both ends: g (x + 2 tau v) after 100 s and 30 s of smoothing, 2 g v between code and carrier."""
+    gradient, interval_s = 300e-6, 1.0
+    front = {"kind": "front", "gradient": gradient, "width_m": 160_000.0, "direction_deg": 264.73, "start_m": -90_000.0,
+             "reference": "baseline"}  # fmt: skip
+    with_front, without = (opened(interval_s=interval_s, **more, **NOTHING) for more in ({"threats": {"a": front}}, {}))
+    numbers = range(len(without))
+    there, quiet = (observed(world, numbers) for world in (with_front, without))
+    satellite = SAT_INDEX["G08"]
+    code_m, carrier_m = (
+        (getattr(there, name) - getattr(quiet, name))[:, :, L1, satellite] for name in ("code_m", "carrier_m")
+    )
+    flight, station = without.params.flight, without.params.station
+    towards = station.towards(math.radians(264.73))
+    position_m, velocity_mps = flight.state(there.since_start_s)
+    away_m = (np.array(without.params.receiver_ecef_m[0]) - position_m) @ towards
+    speed_mps = velocity_mps @ towards
+    divergence_mps = np.diff(code_m[:, -1] - carrier_m[:, -1]) / interval_s
+    # A micrometre from the rounding of 2e7 m.
+    np.testing.assert_allclose(divergence_mps, 2.0 * gradient * 0.5 * (speed_mps[1:] + speed_mps[:-1]), atol=1e-6)
+    assert abs(divergence_mps[-1] - 0.042) < 1e-4
+    errors = {}
+    for tau_s in (100.0, 30.0):
+        weight = interval_s / tau_s
+        errors[tau_s] = np.diff(smoothed(code_m, carrier_m, weight)[:, [0, -1]], axis=1)[:, 0]
+        filled = 1.0 - (1.0 - weight) ** np.arange(len(away_m))
+        expected = -gradient * (away_m + 2.0 * (tau_s - interval_s) * speed_mps * filled)
+        # Over the length of the filter the speed changes by the descent's 0.14 %, and the plane turns under it.
+        np.testing.assert_allclose(errors[tau_s][200:], expected[200:], atol=0.01)
+    separation_m = errors[30.0][-1] - errors[100.0][-1]
+    assert separation_m == pytest.approx(2.0 * 70.0 * gradient * 70.0, abs=0.02)  # 2.94 m
 
 
 def test_the_ionosphere_is_opposite_on_code_and_carrier_and_scaled_by_frequency():
@@ -460,6 +508,7 @@ def test_an_ephemeris_fault_is_broadcast():
              "duration_s": 60.0},
             r"fault frozen: receiver 'airborne' is not there; there are rr1, rr2, rr3, rr4",
         ),
+        ({"systems": "R"}, r"world: systems = 'R' is not G, E or GE"),
         ({"threats": 3}, r"sim\.threats = 3 is not a section"),
         ({"flight": ["climb"]}, r"sim\.flight = \['climb'\] is not a section"),
         ({"ionosphere": {"sigma": 1.0}}, r"sim\.ionosphere\.sigma is unknown"),

@@ -25,8 +25,12 @@ IntArray = NDArray[np.int64]
 
 LARGEST_JUMP: Final = 1_000_000
 """Whole wavelengths by which later arcs are away from the first, at most."""
-_KEPT: Final = 8
+# What is kept of earlier answers: the last ones, and some at marks so that going backwards is not from the start.
+_RECENT: Final = 8
+_MARKED: Final = 128
+_MARKS: Final = 32
 _PASS: Final = 1 << 40  # more epochs than a run can have
+_NO_BREAK: Final[IntArray] = np.zeros((1, 1, 1), dtype=np.int64)
 
 
 class Breaks:
@@ -42,24 +46,32 @@ class Breaks:
 
     def __init__(self, held: Callable[[int], BoolArray], first: int) -> None:
         self._held, self._first = held, first
-        self._kept: dict[int, IntArray] = {}
+        self._recent: dict[int, IntArray] = {}
+        self._marks: dict[int, IntArray] = {}
 
     def at(self, number: int) -> IntArray:
         """Epochs from the first that matters, which is 1, to the last without the signal; 0 if there is none.
 
         Shape (R, N_BANDS, N_SATS); the epoch `number` itself counts.
         """
-        known = max((each for each in self._kept if each <= number), default=None)
-        begin = self._first if known is None else max(self._first, known + 1)
-        last = np.zeros((1, 1, 1), dtype=np.int64) if known is None else self._kept.pop(known)
-        if known is not None:
-            self._kept[known] = last  # the ones used last are kept
-        for each in range(begin, number + 1):
+        if number < self._first:
+            return _NO_BREAK
+        known = max((each for each in (*self._recent, *self._marks) if each <= number), default=self._first - 1)
+        last = self._recent.get(known, self._marks.get(known, _NO_BREAK))
+        for each in range(known + 1, number + 1):
             last = np.where(self._held(each), last, each - self._first + 1)
-        self._kept[number] = last
-        if len(self._kept) > _KEPT:
-            del self._kept[next(iter(self._kept))]
+            if each % _MARKED == 0:
+                _keep(self._marks, each, last, _MARKS)
+        _keep(self._recent, number, last, _RECENT)
         return last
+
+
+def _keep(kept: dict[int, IntArray], number: int, value: IntArray, most: int) -> None:
+    """Put a value last, and forget the first beyond so many."""
+    kept.pop(number, None)
+    kept[number] = value
+    if len(kept) > most:
+        del kept[next(iter(kept))]
 
 
 class Passes:

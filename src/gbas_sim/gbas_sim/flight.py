@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gbas_core.approach import FinalApproach
+from gbas_core.frames import geodetic_from_ecef, rot_enu_ecef
 from gbas_core.record import FloatArray
 
 
@@ -94,6 +95,14 @@ class StraightIn:
 
     def antenna_axis(self, since_start_s: ArrayLike) -> None:
         """None: the antenna always points straight up."""
+
+    def attitude(self, since_start_s: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Roll, pitch, true heading (0 to 2 pi) [rad]: always level, along the ground track."""
+        position_m, velocity_mps = self.state(since_start_s)
+        latitude, longitude, _ = geodetic_from_ecef(position_m)
+        moving = np.einsum("...ij,...j->...i", rot_enu_ecef(latitude, longitude), velocity_mps)
+        level = np.zeros(moving.shape[:-1])
+        return level, level, np.mod(np.arctan2(moving[..., 0], moving[..., 1]), 2.0 * np.pi)
 
     def _profile(self, distance_m: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Height [m] and slope over the distance to the threshold; half a cosine joins descent and level flight."""

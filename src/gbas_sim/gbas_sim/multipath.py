@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import Final
 
@@ -63,7 +64,11 @@ class ElevationCurve:
 
     def at_m(self, elevation_rad: FloatArray) -> FloatArray:
         """Standard deviation [m]; NaN for a missing elevation."""
-        return np.asarray(np.interp(np.degrees(elevation_rad), self.elevation_deg, self.sigma_m))
+        return np.asarray(np.interp(np.degrees(elevation_rad), *self._nodes))
+
+    @cached_property
+    def _nodes(self) -> tuple[FloatArray, FloatArray]:
+        return np.array(self.elevation_deg), np.array(self.sigma_m)
 
 
 _NONE: Final = ElevationCurve()

@@ -281,9 +281,10 @@ class ReceiverBank:
         signal = (lines.range_rate_mps - SPEED_OF_LIGHT_MPS * lines.clock_drift)[:, np.newaxis, :] + advancing
         rate = signal * (1.0 - drift) + SPEED_OF_LIGHT_MPS * drift
         tracked = seen.tracked & np.isfinite(pseudorange)
+        ambiguity_m = self.ambiguity_m(np.where(tracked, seen.arcs, 0))
         values = {
             "code_m": pseudorange + delay + seen.code_m + errors.code_m,
-            "carrier_m": pseudorange - delay + seen.carrier_m + self.ambiguity_m(seen.arcs) + errors.carrier_m,
+            "carrier_m": pseudorange - delay + seen.carrier_m + ambiguity_m + errors.carrier_m,
             "doppler_hz": -rate / WAVELENGTH_M[:, np.newaxis] + errors.doppler_hz,
             "cn0_dbhz": errors.cn0_dbhz,
             "lli": np.where(seen.tracked_before, 0.0, 1.0),

@@ -28,7 +28,7 @@ VERSION: Final = "3.05"
 LABEL: Final = "SIMULATED DATA - NOT FROM ANY RECEIVER OR SATELLITE"
 TRUTH_COLUMNS: Final = (
     "gps_week", "tow_s", "x_m", "y_m", "z_m", "vx_mps", "vy_mps", "vz_mps",
-    "latitude_deg", "longitude_deg", "height_m", "simulated",
+    "latitude_deg", "longitude_deg", "height_m", "roll_deg", "pitch_deg", "heading_deg", "simulated",
 )  # fmt: skip
 _PROGRAM: Final = "gbas sim"
 # Observation codes of both systems: C/A and E1C, L5Q and E5aQ.
@@ -234,4 +234,5 @@ def truth_line(truth: Truth) -> str:
     latitude, longitude, height = (float(each) for each in geodetic_from_ecef(truth.position_m))
     numbers = [f"{each:.4f}" for each in (*truth.position_m.tolist(), *truth.velocity_mps.tolist())]
     place = [f"{math.degrees(latitude):.10f}", f"{math.degrees(longitude):.10f}", f"{height:.4f}"]
-    return ",".join([str(truth.gps_week), f"{truth.tow_s:.3f}", *numbers, *place, "1"]) + "\n"
+    attitude = [f"{math.degrees(each):.4f}" for each in (truth.roll_rad, truth.pitch_rad, truth.heading_rad)]
+    return ",".join([str(truth.gps_week), f"{truth.tow_s:.3f}", *numbers, *place, *attitude, "1"]) + "\n"

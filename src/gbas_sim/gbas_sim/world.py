@@ -22,7 +22,7 @@ from gbas_core.observations import ObservationEpoch
 from gbas_core.orbits import SatelliteState, group_delay_s
 from gbas_core.record import FloatArray
 from gbas_core.satellites import N_SATS, SAT_INDEX, satellites_of
-from gbas_core.signals import L2, N_BANDS
+from gbas_core.signals import L1, L2, L5, N_BANDS
 from gbas_sim.antenna import airframe_loss_db
 from gbas_sim.arcs import Breaks, IntArray, Passes, arc_numbers
 from gbas_sim.broadcast import Arc, Orbits, almanac_orbits, nominal_orbits, recorded_orbits
@@ -79,6 +79,10 @@ class FlightPath(Protocol):
 
     def antenna_axis(self, since_start_s: ArrayLike) -> FloatArray | None:
         """Where the antenna points, unit vectors ``(..., 3)``, ECEF, at times; None is straight up at all of them."""
+        ...
+
+    def attitude(self, since_start_s: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Roll, pitch and true heading at times [rad]."""
         ...
 
 
@@ -152,9 +156,8 @@ class WorldParams:
         _within("interval_s", self.interval_s, 0.01, 60.0)
         _whole_milliseconds("start_tow_s", self.start_tow_s)
         _whole_milliseconds("interval_s", self.interval_s)
-        if not self.systems or len(set(self.systems)) != len(self.systems):
+        if self.systems not in ("G", "E", "GE", "EG"):
             raise ValueError(f"world: systems = {self.systems!r} is not G, E or GE")
-        satellites_of(self.systems)
         if self.almanac and self.navigation:
             raise ValueError("world: almanac and navigation are both given; orbits have one source")
         self._check_duration()
@@ -228,12 +231,17 @@ class Truth:
         Time tag of the epoch.
     position_m, velocity_mps : (3,) arrays
         ECEF [m], [m/s].
+    roll_rad, pitch_rad, heading_rad : float
+        Attitude: right wing down, nose up, true heading clockwise from north.
     """
 
     gps_week: int
     tow_s: float
     position_m: FloatArray
     velocity_mps: FloatArray
+    roll_rad: float
+    pitch_rad: float
+    heading_rad: float
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -400,15 +408,27 @@ class World:
             raise IndexError(f"epoch {number} is not within 0 to {len(self) - 1}")
         now = self._instant(number)
         observations = self._with_frozen(number, self._observations(number))
-        count, truth = len(self._sites_m), None
-        if self.params.flight is not None:
-            position_m, velocity_mps = now.paths.position_m[-1], now.paths.velocity_mps[-1]
-            truth = Truth(gps_week=now.gps_week, tow_s=now.tow_s, position_m=position_m, velocity_mps=velocity_mps)
+        count = len(self._sites_m)
         return SimulatedEpoch(
             key=epoch_key(now.gps_week, now.tow_s),
             ground=observations[:count],
             airborne=observations[count] if len(observations) > count else None,
-            truth=truth,
+            truth=self._truth(number, now),
+        )
+
+    def _truth(self, number: int, now: _Instant) -> Truth | None:
+        if self.params.flight is None:
+            return None
+        since_s = 0.001 * (number * self._interval_ms) - now.clock.offset_s[-1]
+        roll, pitch, heading = self.params.flight.attitude(np.array(since_s))
+        return Truth(
+            gps_week=now.gps_week,
+            tow_s=now.tow_s,
+            position_m=now.paths.position_m[-1],
+            velocity_mps=now.paths.velocity_mps[-1],
+            roll_rad=float(roll),
+            pitch_rad=float(pitch),
+            heading_rad=float(heading),
         )
 
     def _observations(self, number: int) -> tuple[ObservationEpoch, ...]:
@@ -566,7 +586,8 @@ class World:
         if self._scintillation is not None:
             scintillation = self._scintillation.epoch(paths, self._numbers)
             held &= ~scintillation.lost[:, np.newaxis]
-            change_db -= np.stack([scintillation.fading_db(band) for band in range(N_BANDS)], axis=1)
+            for band in (L1, L5):
+                change_db[:, band] -= scintillation.fading_db(band)
         if effect is not None:
             held &= effect.tracked
             change_db += effect.cn0_db

@@ -154,6 +154,11 @@ class Flight:
         down_enu = rot_body_enu(climb, heading, bank, alpha)[..., 2, :]
         return np.asarray(-np.einsum("...ji,...j->...i", rot_enu_ecef(latitude, longitude), down_enu))
 
+    def attitude(self, since_start_s: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Roll, pitch and true heading (0 to 2 pi) at times since the start ``(...)`` [rad]."""
+        value, _, _ = self._tables.flown.derivatives(np.asarray(since_start_s, dtype=np.float64))
+        return euler_angles(rot_body_enu(*(value[..., column] for column in (_CLIMB, _HEADING, _BANK, _ALPHA))))
+
     def flight_state(self, since_start_s: ArrayLike) -> FlightState:
         """All there is to know of the aircraft at times (T,) since the start of the flight [s]."""
         return _state(self._tables.origin_m, self._tables.flown, since_start_s)
