@@ -142,20 +142,64 @@ def test_first_and_second_band_of_any_pair():
     assert result.mean_mps[:, FAULTY] == pytest.approx(combination_matrix(L1, L2) @ world.fault, abs=1e-5)
 
 
-def test_a_fault_on_the_carrier_shows_on_the_others_until_it_is_out_of_their_clocks():
-    world = World(fault=(0.0, 0.0, 0.4, 0.0))
-    inside = run(world, epochs=STEADY)
+def test_a_fault_that_is_not_detected_shows_on_the_others_as_the_papers_mean_has_it():
+    world = World(fault=(0.0, 0.0, 0.002, 0.002))
+    result = run(world, epochs=STEADY)
     d_if = combination_matrix(L1, L5)[3] @ world.fault
     gps = [s for s in GROUPS[0] if s != FAULTY]
-    assert inside.mean_mps[3, gps] == pytest.approx(np.full(4, -d_if / 4.0), rel=1e-3)
-    assert inside.mean_mps[3, GROUPS[1]] == pytest.approx(np.zeros(4), abs=1e-6)
+    assert not result.sound.failed.any()
+    assert result.mean_mps[3, FAULTY] == pytest.approx(d_if, rel=1e-3)
+    assert result.mean_mps[3, gps] == pytest.approx(np.full(4, -d_if / 4.0), rel=1e-3)
+    assert result.mean_mps[3, GROUPS[1]] == pytest.approx(np.zeros(4), abs=1e-6)
 
+
+def test_a_fault_that_is_detected_stays_with_its_satellite():
+    world = World(fault=(0.0, 0.0, 0.4, 0.0))
+    results, _ = run(world, epochs=STEADY, keep=True)
+    failed = np.array([each.sound.failed for each in results])
+    assert np.flatnonzero(failed.any(axis=0)).tolist() == [FAULTY]
+    assert failed[60:, FAULTY].all()
+    d_if = combination_matrix(L1, L5)[3] @ world.fault
+    others = [s for s in SEEN if s != FAULTY]
+    assert results[-1].mean_mps[3, FAULTY] == pytest.approx(d_if, rel=1e-3)
+    assert results[-1].mean_mps[3, others] == pytest.approx(np.zeros(8), abs=1e-6)
+    assert (results[-1].clock_satellites[[0, FAULTY]] == [3, 4]).all()
+
+
+def test_two_faults_at_once_stay_with_their_satellites():
+    def change(number, seen):
+        seen["carrier_m"][:, L1, [0, 50]] += 0.2 * T_S * number
+
+    params = TwoFrequencyParams(filters=QUICK.filters, min_clock_satellites=2)
+    result = run(World(), params=params, epochs=STEADY, change=change)
+    assert np.flatnonzero(result.sound.failed).tolist() == [0, 50]
+
+
+def test_too_few_for_a_verdict_without_the_suspect_fail_together():
+    def change(number, seen):
+        seen["carrier_m"][:, L1, 50] += 0.2 * T_S * number  # one of four: without it three are left, with two others
+
+    result = run(World(), epochs=STEADY, change=change)
+    assert np.flatnonzero(result.sound.failed).tolist() == GROUPS[1]
+
+
+def test_a_satellite_that_may_not_be_in_the_clock_is_not():
     def change(number, seen):
         seen["clock_used"][:, FAULTY] = False
 
-    outside = run(World(fault=world.fault), epochs=STEADY, change=change)
-    assert outside.mean_mps[3, gps] == pytest.approx(np.zeros(4), abs=1e-6)
-    assert outside.mean_mps[3, FAULTY] == pytest.approx(d_if, rel=1e-3)
+    world = World(fault=(0.0, 0.0, 0.002, 0.002))
+    result = run(world, epochs=STEADY, change=change)
+    gps = [s for s in GROUPS[0] if s != FAULTY]
+    assert result.mean_mps[3, gps] == pytest.approx(np.zeros(4), abs=1e-6)
+    assert result.mean_mps[3, FAULTY] == pytest.approx(combination_matrix(L1, L5)[3] @ world.fault, rel=1e-3)
+
+
+def test_faults_of_all_satellites_are_not_explained_away():
+    def change(number, seen):
+        seen["code_m"][:, L1] += 0.2 * T_S * number  # on every code of L1
+
+    result = run(World(), epochs=STEADY, change=change)
+    assert result.sound.failed[list(SEEN)].all()
 
 
 def test_a_gap_is_bridged_without_the_clock():
@@ -245,7 +289,7 @@ def test_thresholds():
 
 
 def test_forms_are_quadratic_forms_of_the_means():
-    world = World(receivers=3, noise_m=1.0)
+    world = World(receivers=3, noise_m=0.1)
     result = run(world)
     inverse = np.linalg.pinv(PRINTED_COVARIANCE)
     for satellite in SEEN:

@@ -13,9 +13,13 @@ quantile of chi-square. Two forms run side by side:
 
 A divergence like the ionosphere's, (1, gamma, -1, -gamma) on codes and carriers, is invisible to both, on purpose.
 
-The receiver clock of a satellite is the mean over the *other* satellites of its constellation. A channel that misses
-epochs bridges the gap with the clock accumulated meanwhile. A fault as large as d appears on the n others as -d/n until
-the satellite is taken out of the mean, so the caller names the satellites that may be in it.
+The receiver clock of a satellite is the mean over the *other* satellites of its constellation. Filters are linear, so
+it is removed in two steps: the mean of all before the filters, and what the others have left of it behind them, which
+comes to the same. A fault as large as d would appear on n others as -d/n; behind the filters a satellite under
+suspicion is taken out of the others' clock together with all it has done to it. Suspicion falls on the satellite with
+the largest metric above the threshold, then on the next, as long as any is above.
+
+A channel that misses epochs bridges the gap with the mean accumulated meanwhile.
 
 Source: Jiang, Milner, Macabiau, ENC 2015, eq (8) to (18).
 """
@@ -50,6 +54,8 @@ Form = Literal["paper", "sound"]
 DEGREES_OF_FREEDOM: Final[dict[Form, int]] = {"paper": 4, "sound": 3}
 # Known: obliquity 1 / sqrt(0.002 + sin^2 E). Source: ICAO Annex 10 Vol. I, App. B 3.6.5.3.
 _OBLIQUITY: Final = 0.002
+# Uncertain, ours: more satellites at once are no satellites' faults, and all of them fail.
+_MOST_SUSPECTS: Final = 4
 _PRINTED_INVERSE: Final = np.linalg.pinv(PRINTED_COVARIANCE)
 
 
@@ -140,11 +146,11 @@ class TwoFrequencyState:
     codes : DivergenceState
         ``(2, R, N)``: DF of both bands.
     carrier : DivergenceState
-        ``(R, N)``: filters of the compensated IF carrier's rate.
+        ``(R, N)``: filters of the compensated IF carrier's rate, less the mean of all.
     residual_m : (R, N) array
         Last IF carrier less geometry, satellite clock and troposphere [m].
     clock_m : (R, N) array
-        Receiver clock accumulated since then [m].
+        Mean of all accumulated since then [m].
     since_s : (R, N) array
         Time since then [s].
     rebased : (N,) bool array
@@ -166,7 +172,8 @@ class TwoFrequencyEpoch:
     Attributes
     ----------
     receiver_mps : (3, R, N) array
-        Filtered DF, DF of the other band and IF carrier of each channel, settled or not [m/s].
+        Filtered DF, DF of the other band and IF carrier of each channel; the carrier only where enough other channels
+        have settled to give the clock [m/s].
     settled : (R, N) bool array
         Where all three count.
     mean_mps : (4, N) array
@@ -222,16 +229,41 @@ def two_frequency_step(
     codes, _, code_rates = divergence_step(
         state.codes, _divergence_free(epoch, params), restarted, dt_s, params.filters
     )
-    new, carrier_rate, others = _carrier(state, epoch, restarted, dt_s, params)
+    new, carrier_rate = _carrier(state, epoch, restarted, dt_s, params)
     counts = settled(codes, params.filters).all(axis=0) & settled(new.carrier, params.filters)
-    receiver = np.concatenate([code_rates, carrier_rate[np.newaxis]])
+    suspect = np.zeros(N_SATS, dtype=bool)
+    result = _judged(code_rates, carrier_rate, counts, suspect, epoch, params)
+    for _ in range(_MOST_SUSPECTS):
+        candidates = result.sound.failed & ~suspect & (counts & epoch.clock_used).any(axis=0)
+        if not candidates.any():
+            break
+        suspect[np.where(candidates, result.sound.statistic, -np.inf).argmax()] = True
+        without = _judged(code_rates, carrier_rate, counts, suspect, epoch, params)
+        if not np.isfinite(without.sound.statistic[result.sound.failed]).all():
+            break  # too few are left to judge what has failed: it stays so
+        result = without
+    return replace(new, codes=codes), result
+
+
+def _judged(
+    code_rates: FloatArray,
+    carrier_rate: FloatArray,
+    counts: BoolArray,
+    suspect: BoolArray,
+    epoch: TwoFrequencyInput,
+    params: TwoFrequencyParams,
+) -> TwoFrequencyEpoch:
+    """Statistics and verdicts with receiver clocks that do without the satellites under suspicion."""
+    clock, others = _others_mean(carrier_rate, counts & epoch.clock_used & ~suspect, params.min_clock_satellites)
+    receiver = np.concatenate([code_rates, (carrier_rate - clock)[np.newaxis]])
+    counts = counts & np.isfinite(clock)
     averaged = counts & epoch.used
     rates, count = receiver_mean(receiver.swapaxes(0, 1), averaged[:, np.newaxis])
     receivers = count[0]
     n_clock = np.where(averaged, others, np.inf).min(axis=0)
     covariance = params.covariance.at(epoch.elevation_rad, receivers, n_clock)
     means = with_iono_free_code(rates, params.band, params.other)
-    result = TwoFrequencyEpoch(
+    return TwoFrequencyEpoch(
         receiver_mps=receiver,
         settled=counts,
         mean_mps=means,
@@ -241,7 +273,6 @@ def two_frequency_step(
         paper=_paper(means, receivers, params),
         sound=upper_limit(sound_form(rates, covariance), threshold("sound", params.p_false_alarm), receivers > 0),
     )
-    return replace(new, codes=codes), result
 
 
 def _paper(means_mps: FloatArray, receivers: FloatArray, params: TwoFrequencyParams) -> MonitorResult:
@@ -305,8 +336,8 @@ def _divergence_free(epoch: TwoFrequencyInput, params: TwoFrequencyParams) -> Fl
 
 def _carrier(
     state: TwoFrequencyState, epoch: TwoFrequencyInput, restarted: BoolArray, dt_s: float, params: TwoFrequencyParams
-) -> tuple[TwoFrequencyState, FloatArray, FloatArray]:
-    """Rate of the compensated IF carrier, filtered, and the satellites behind each clock, ``(R, N)``."""
+) -> tuple[TwoFrequencyState, FloatArray]:
+    """Filtered rate of the compensated IF carrier less the mean of all, ``(R, N)``."""
     a, b = params.band, params.other
     iono_free = ionosphere_free(epoch.carrier_m[:, a], epoch.carrier_m[:, b], a, b)
     troposphere = params.zenith_delay_m / np.sqrt(_OBLIQUITY + np.sin(epoch.elevation_rad) ** 2)
@@ -317,8 +348,7 @@ def _carrier(
     change = np.where(alive & present & ~epoch.rebased, residual - state.residual_m, np.nan)
     # Channels measured at the last epoch, too: what they have in common is the clock of this one interval.
     together = np.isfinite(change) & (state.since_s == 0.0)
-    clock, n_clock = _others_mean(change, together & epoch.clock_used, params.min_clock_satellites)
-    accumulated = state.clock_m + clock
+    accumulated = state.clock_m + _mean(change, together & epoch.clock_used)
     rate = (change - accumulated) / since_s
     # The one epoch at which the expected range jumps tells nothing: the filter goes on with the rate it has.
     coasting = epoch.rebased & ~state.rebased & alive & present
@@ -332,18 +362,31 @@ def _carrier(
         since_s=np.where(present, 0.0, since_s),
         rebased=epoch.rebased,
     )
-    return new, filtered, n_clock
+    return new, filtered
 
 
-def _others_mean(change_m: FloatArray, member: BoolArray, fewest: int) -> tuple[FloatArray, FloatArray]:
-    """Mean over the other members of the same constellation, and how many they are; NaN below `fewest`.
-
-    Source: ENC 2015, eq (13), with i for the first j.
-    """
-    own = np.where(member, change_m, 0.0)
+def _totals(values: FloatArray, member: BoolArray) -> tuple[FloatArray, FloatArray]:
+    """Sum over the members of each channel's constellation, and how many they are, ``(R, N)``."""
+    own = np.where(member, values, 0.0)
     total, count = np.zeros_like(own), np.zeros_like(own)
     for group in CLOCK_GROUPS:
         total += np.where(group, (own * group).sum(axis=-1, keepdims=True), 0.0)
         count += np.where(group, (member & group).sum(axis=-1, keepdims=True), 0)
+    return total, count
+
+
+def _mean(values: FloatArray, member: BoolArray) -> FloatArray:
+    """Mean over the members of each channel's constellation; NaN where there are none."""
+    total, count = _totals(values, member)
+    return np.where(count > 0.0, total / np.maximum(count, 1.0), np.nan)
+
+
+def _others_mean(values: FloatArray, member: BoolArray, fewest: int) -> tuple[FloatArray, FloatArray]:
+    """Mean over the other members of the same constellation, and how many they are; NaN below `fewest`.
+
+    Source: ENC 2015, eq (13), with i for the first j.
+    """
+    total, count = _totals(values, member)
     others = count - member
-    return np.where(others >= fewest, (total - own) / np.maximum(others, 1.0), np.nan), others
+    mean = (total - np.where(member, values, 0.0)) / np.maximum(others, 1.0)
+    return np.where(others >= fewest, mean, np.nan), others

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -26,7 +27,7 @@ from gbas_core.signals import L1, L5
 from gbas_ground.monitors.divergence_covariance import INDEPENDENT
 from gbas_ground.monitors.two_frequency_divergence import threshold
 
-_COLUMNS = combination_matrix(L1, L5)[list(INDEPENDENT)]
+COLUMNS: Final[FloatArray] = combination_matrix(L1, L5)[list(INDEPENDENT)]
 # Epochs from rest to settled in time constants: what is missing then is below 1e-6 of the noise.
 _SETTLED_TAU = 16.0
 
@@ -150,11 +151,11 @@ def two_frequency(
     epochs = _epochs(params, interval_s)
     pulse = _impulse_response(params, interval_s, epochs)
     energy = float((pulse**2).sum())
-    covariance = energy * (_COLUMNS * sigma_m**2) @ _COLUMNS.T
+    covariance = energy * (COLUMNS * sigma_m**2) @ COLUMNS.T
     root = np.linalg.cholesky(covariance)
     limit = np.sqrt(threshold("sound", p_false_alarm))
     drift = np.zeros(4) if mode is None else d_mps * fault_direction(mode)
-    mean = solve_triangular(root, _COLUMNS @ drift, lower=True)
+    mean = solve_triangular(root, COLUMNS @ drift, lower=True)
     size = float(np.linalg.norm(mean))
     if mode is None and alarm:
         unit = rng.normal(size=(3, samples))
@@ -163,11 +164,11 @@ def two_frequency(
         toward = limit / size - 1.0 if (size > limit) != alarm and size > 0.0 else 0.0
         aim = np.broadcast_to(toward * mean[:, np.newaxis], (3, samples))
     # Smallest mean of the four noises that brings the statistics where they are wanted.
-    push = (sigma_m**2)[:, np.newaxis] * (_COLUMNS.T @ solve_triangular(root, aim, lower=True, trans=1))
+    push = (sigma_m**2)[:, np.newaxis] * (COLUMNS.T @ solve_triangular(root, aim, lower=True, trans=1))
 
     def values(number: int) -> FloatArray:
         four = rng.normal(size=(4, samples)) * sigma_m[:, np.newaxis] + pulse[number] * push
-        return np.asarray(_COLUMNS @ (four + (drift * interval_s * number)[:, np.newaxis]))
+        return np.asarray(COLUMNS @ (four + (drift * interval_s * number)[:, np.newaxis]))
 
     filtered = _filtered(values, epochs, (3, samples), params, interval_s)
     z = solve_triangular(root, filtered, lower=True)

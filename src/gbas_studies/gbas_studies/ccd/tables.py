@@ -48,7 +48,7 @@ STARTS: Final[tuple[Start, ...]] = ("variant", "invariant")
 _SETTING: Final = (
     "T is 0.5 s, tau 30 s; the ground filter has settled; the air filter starts with the raw code at t_a and is used "
     "after 99 updates (50 s); a point counts as detected when the statistic exceeds its threshold at that sample. The "
-    "paper's grid is d = 0.01 to 0.10 step 0.01 m/s, t_a - t_f = -150 to +150 step 1 s; the rates and offsets it prints "
+    "paper's grid is d = 0.01 to 0.10 step 0.01 m/s, t_a - t_f = -150 to +150 step 1 s; the rates and offsets printed "
     "beside its values have flipped signs and shifted rates, so that only the values are compared."
 )
 
@@ -278,8 +278,9 @@ def table_4() -> Section:
             Value(
                 name=f"Table 4, {mode}, variant", paper=text, ours=rounded.value, unit="m",
                 tolerance=3e-4 * float(text),
-                definition="Largest |E_r| with the paper's metric not above 47.8795, printed Q, the rounded coefficients "
-                f"of eq (17), paper's grid. Found {_where(rounded)}; {exact.value:.5g} m with exact coefficients.",
+                definition="Largest |E_r| with the paper's metric not above 47.8795, printed Q, rounded eq (17), "
+                "paper's "
+                f"grid. Found {_where(rounded)}; {exact.value:.5g} m with exact coefficients.",
                 why="The last point of the coarse grid that is not detected. No definition we tried gives the last "
                 "digit; the finer grid shows what the value is worth.",
             )
@@ -351,8 +352,8 @@ def table_6() -> Section:
         )  # fmt: skip
     return Section(
         title="Table 6: smallest mapping function of GAST F on L5", items=items,
-        text="The ratio of non-centrality to error is proportional to d, so that its minimum says which smallest rate the "
-        "grid has. The non-centrality over the square of the error does not depend on d.\n\n" + _SETTING,
+        text="The ratio of non-centrality to error is proportional to d, so that its minimum says which smallest rate "
+        "the grid has. The non-centrality over the square of the error does not depend on d.\n\n" + _SETTING,
     )  # fmt: skip
 
 
@@ -395,8 +396,8 @@ def _compliance() -> list[Item]:
             Claim(
                 name=f"Required P_md, {mode}, {monitor}", paper_text="met", holds=holds,
                 ours_text="met" if holds else "not met", why="" if holds else "The required region is left.",
-                definition="Every rate from 0.001 to 10 m/s and every offset at which the error is 0.75 m or more, settled "
-                f"noise. Largest P_md there: {missed[needed].max():.1e}.",
+                definition="Every rate from 0.001 to 10 m/s and every offset at which the error is 0.75 m or more, "
+                f"settled noise. Largest P_md there: {missed[needed].max():.1e}.",
             )
         )  # fmt: skip
     return items
