@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
 from mcap.reader import make_reader
 from mcap.stream_reader import StreamReader
 from rosbags.highlevel import AnyReader
@@ -26,9 +27,11 @@ from gbas_bringup.mcap_scan import McapScan, Message
 from gbas_bringup.topic_names import contract_name, is_ephemeris, is_observation, is_progress, split
 from gbas_core.gpstime import calendar_text, epoch_key, from_epoch_key
 from gbas_core.record import Record
+from gbas_core.satellites import SAT_IDS, SAT_INDEX
+from gbas_ground.causes import SATELLITE_MONITORS
 from gbas_msgs_py import topics
 from gbas_msgs_py.events import Event, EventError, EventKind
-from gbas_msgs_py.records import ProtectionEpoch
+from gbas_msgs_py.records import GROUND_MONITORS, MonitorEpoch, MonitorState, ProtectionEpoch
 from gbas_msgs_py.ros import BURST_LABEL, burst_from_msg, table_from_msg
 from gbas_msgs_py.schema import SchemaError
 from gbas_msgs_py.vdb.receive import decode_burst
@@ -115,6 +118,7 @@ def check(path: Path) -> CheckResult:
     contents.check_order()
     contents.check_frames()
     contents.check_alerts()
+    contents.check_exclusions()
     return result
 
 
@@ -189,6 +193,8 @@ class _Contents:
         self._frames: dict[str, dict[int, _Frame]] = defaultdict(dict)
         self._protection: dict[str, list[tuple[int, int, str, ProtectionEpoch]]] = defaultdict(list)
         self._alerts: dict[int, list[Event]] = defaultdict(list)
+        self._exclusions: list[Event] = []
+        self._failed: dict[tuple[int, str, str], tuple[float, float]] = {}
         self._specs = {topics.resolve(spec.name): spec for spec in topics.TOPICS}
 
     def read(self, file: Path) -> int:
@@ -263,6 +269,8 @@ class _Contents:
             event = Event.from_json(decoded.data)
             if event.kind is EventKind.ALERT:
                 self._alerts[event.epoch].append(event)
+            elif event.kind is EventKind.EXCLUSION and event.cause in SATELLITE_MONITORS and event.subject in SAT_INDEX:
+                self._exclusions.append(event)
 
     def _table(self, file: str, topic: str, index: int, decoded: Any, schema: str | None) -> None:
         record: Record = table_from_msg(decoded)
@@ -273,6 +281,10 @@ class _Contents:
         self._series[topic].keys.append(key)
         if isinstance(record, ProtectionEpoch):
             self._protection[topic].append((key, index, file, record))
+        elif isinstance(record, MonitorEpoch):
+            for row, satellite in np.argwhere(record.state == MonitorState.FAILED):
+                values = float(record.statistic[row, satellite]), float(record.threshold[row, satellite])
+                self._failed[key, GROUND_MONITORS[row], SAT_IDS[satellite]] = values
 
     def _burst(self, file: str, topic: str, index: int, decoded: Any) -> None:
         burst = burst_from_msg(decoded)
@@ -307,7 +319,7 @@ class _Contents:
     def _outputs(self, observed: list[int]) -> None:
         for topic, series in self._series.items():
             namespace, name = split(topic)
-            if name == topics.GROUND_INTEGRITY:
+            if name in (topics.GROUND_INTEGRITY, topics.GROUND_MONITORS, topics.GROUND_CHANNELS):
                 self._complete(topic, series, observed, "was observed")
             elif name in (topics.AIRBORNE_SOLUTION, topics.AIRBORNE_PROTECTION):
                 source = self._series.get(f"{namespace}/{topics.AIRBORNE_OBSERVATIONS}")
@@ -367,6 +379,19 @@ class _Contents:
                     self._trace(topic, key, index, file, begins=alert != 0.0)
                 before = alert
                 self._result.checked["protection levels"] += 1
+
+    def check_exclusions(self) -> None:
+        """Each satellite a monitor excluded must have failed in that monitor's table, by the same value."""
+        topic = topics.resolve(topics.GROUND_MONITORS)
+        if topic not in self._series:
+            return
+        for event in self._exclusions:
+            names = SATELLITE_MONITORS[event.cause]
+            measured = [self._failed.get((event.epoch, name, event.subject)) for name in names]
+            if (event.value, event.threshold) not in measured:
+                what = f"the exclusion of {event.subject} at {_epoch(event.epoch)} by {event.cause} is not in the table"
+                self._result.problem(Problem(what, self._series[topic].file, topic))
+            self._result.checked["exclusions traced"] += 1
 
     def _trace(self, topic: str, key: int, index: int, file: str, *, begins: bool) -> None:
         events = [event for event in self._alerts.get(key, []) if (event.cause == "cleared") != begins]

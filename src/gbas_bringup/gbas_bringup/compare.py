@@ -21,6 +21,8 @@ NAMES: Final[dict[str, str]] = {
     topics.AIRBORNE_SOLUTION: "solutions",
     topics.VDB: "VDB bursts",
     topics.GROUND_INTEGRITY: "integrity epochs",
+    topics.GROUND_MONITORS: "monitor epochs",
+    topics.GROUND_CHANNELS: "channel epochs",
 }
 """Outputs that are compared, and what they are called."""
 
