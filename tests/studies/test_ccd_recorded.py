@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from gbas_core.divergence import GROUND
+from gbas_core.recording import RecordedEpoch
+from gbas_core.rtcm import read_rtcm
 from gbas_core.satellites import SAT_INDEX
 from gbas_ground.monitors.code_carrier_divergence import CcdParams
 from gbas_ground.monitors.two_frequency_divergence import TwoFrequencyParams, threshold
@@ -22,7 +24,6 @@ from gbas_studies.ccd.recorded import (
     monitor_epochs,
     monitor_set,
 )
-from rtcm_observations import recorded_epochs
 
 LIMIT = threshold("sound", 1e-9)
 
@@ -109,7 +110,10 @@ def test_whole_days_of_the_storm(number, data_dir):
 )  # fmt: skip
 def test_streams_with_gaps_are_survived(name, lost, longest_s, data_dir):
     """RTCM without ephemerides: what needs geometry is not monitored, the rest is, and begins anew after the gaps."""
-    epochs = list(recorded_epochs(data_dir / "raw_streams" / name, gps_week=2200))
+    stream = read_rtcm(data_dir / "raw_streams" / name, gps_week=2300)
+    epochs = [
+        RecordedEpoch(key=int(key), ground=(stream.epoch(row),), user=None) for row, key in enumerate(stream.keys)
+    ]
     seen = monitor_epochs(
         epochs, (), np.array(ANTENNAS_M[:1]), CcdParams(filters=SHORT_SETTLE), TwoFrequencyParams(filters=SHORT_SETTLE)
     )
