@@ -175,6 +175,31 @@ def test_two_faults_at_once_stay_with_their_satellites():
     assert np.flatnonzero(result.sound.failed).tolist() == [0, 50]
 
 
+def test_suspicion_falls_on_the_fault_though_others_with_smaller_sigmas_pass_first():
+    covariance = StatisticCovariance(elevation_rad=(0.2, 0.5), factor=((1.0, 1.0, 10.0), (1.0, 1.0, 1.0)))
+    params = TwoFrequencyParams(filters=QUICK.filters, zenith_delay_m=0.0, covariance=covariance)
+
+    def change(number, seen):
+        seen["elevation_rad"][FAULTY] = 0.1  # ten times the sigma: the others would fail with a quarter of the fault
+
+    clock = (0.04, 0.04, 0.04, 0.04)  # on the IF carrier alone
+    results, _ = run(World(fault=clock), params=params, epochs=STEADY, change=change, keep=True)
+    failed = np.array([each.sound.failed for each in results])
+    assert not np.delete(failed, FAULTY, axis=1).any()
+    expected = (0.04 / (10.0 * np.sqrt(0.0724e-5 * 1.25))) ** 2  # the printed variance, four satellites in the clock
+    assert results[-1].sound.statistic[FAULTY] == pytest.approx(expected, rel=0.05)
+
+
+def test_a_code_fault_leaves_the_clocks_alone():
+    def change(number, seen):
+        seen["code_m"][:, L5, 20] += 0.05 * T_S * number
+        seen["carrier_m"][:, :, 3] += 0.001 * T_S * number  # the largest carrier rate, and no fault
+
+    result = run(World(), epochs=STEADY, change=change)
+    assert np.flatnonzero(result.sound.failed).tolist() == [20]
+    assert result.clock_satellites[[0, 3, 20]].tolist() == [4.0, 4.0, 4.0]
+
+
 def test_too_few_for_a_verdict_without_the_suspect_fail_together():
     def change(number, seen):
         seen["carrier_m"][:, L1, 50] += 0.2 * T_S * number  # one of four: without it three are left, with two others

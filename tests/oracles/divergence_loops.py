@@ -55,3 +55,37 @@ def clock_free(rates: np.ndarray, groups: list[list[int]]) -> np.ndarray:
             if others and not np.isnan(rates[i]):
                 result[i] = rates[i] - sum(others) / len(others)
     return result
+
+
+def hatch(code: list[float], carrier: list[float], alpha: float, variant: bool) -> float:
+    """Last smoothed range of a filter that starts with the first code: eq (19), sample by sample."""
+    smoothed = code[0]
+    for m in range(1, len(code)):
+        weight = max(1.0 / m, alpha) if variant else alpha
+        smoothed = weight * code[m] + (1.0 - weight) * (smoothed + carrier[m] - carrier[m - 1])
+    return smoothed
+
+
+def differential_error(
+    code_rate: float, carrier_rate: float, t_a: float, *, variant: bool, updates: int = 99, t_g: float = -360.0,
+    interval: float = 0.5, tau: float = 30.0,
+) -> float:  # fmt: skip
+    """|air - ground| after so many updates of the air filter; the ramp acts from t = 0 on."""
+    alpha = interval / tau
+    end = round(t_a / interval) + updates
+
+    def smoothed(start_s: float) -> float:
+        samples = range(round(start_s / interval), end + 1)
+        ramp = [max(n, 0) * interval for n in samples]
+        return hatch([code_rate * r for r in ramp], [carrier_rate * r for r in ramp], alpha, variant)
+
+    return abs(smoothed(t_a) - smoothed(t_g))
+
+
+def ccd_statistic(rate: float, t_a: float, *, updates: int = 99, interval: float = 0.5, tau: float = 30.0) -> float:
+    """F2 of a ramp of code minus carrier at the same sample, by the recursion."""
+    alpha, f1, f2 = interval / tau, 0.0, 0.0
+    for _ in range(max(round(t_a / interval) + updates, 0)):
+        f1 += alpha * (rate - f1)
+        f2 += alpha * (f1 - f2)
+    return f2

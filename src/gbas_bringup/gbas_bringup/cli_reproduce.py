@@ -29,7 +29,7 @@ def register(app: typer.Typer) -> None:
 
 
 def reproduce(
-    study: Annotated[str, typer.Argument(metavar="STUDY", help="ccd, asigm, modes or abia, or all that there are.")],
+    study: Annotated[str, typer.Argument(metavar="STUDY", help="a paper (ccd, asigm, modes, abia), or all.")],
     out: Annotated[Path | None, typer.Option(help="Folder for what is written (default: out/STUDY-N).")] = None,
     data: Annotated[Path | None, typer.Option(help="Folder of recorded data (default: GBAS_DATA).")] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Smaller campaigns: less exact.")] = False,
@@ -38,9 +38,9 @@ def reproduce(
 ) -> None:
     """Recompute a published paper: every table and figure, the paper's value beside ours.
 
-    Writes report.html (complete in itself), results.json, and pictures with their data as CSV. Each item has its
-    definition and a verdict that follows from the printed digits. Nothing is tuned: what does not come out is said,
-    and why.
+    Writes report.html (complete in itself), results.json, and pictures with their data as CSV.
+
+    Each item has its definition and a verdict that follows from the printed digits; what does not come out is said.
     """
     from gbas_bringup.progress import progress
     from gbas_studies.reproduction import registry

@@ -48,9 +48,9 @@ def ccd(
 ) -> None:
     """Worst undetected differential error under a code-carrier divergence, and the smallest mapping function.
 
-    max_error_m is the largest error on the grid that the monitor does not detect, at the rate d_mps and with the air
-    filter started onset_s after the fault. min_mapping is the smallest ratio of statistic to error: F2/E [1/s] for
-    gast-d, non-centrality/E [1/m] for the others, which is proportional to the smallest rate of the grid.
+    max_error_m is the largest error on the grid that is not detected, at d_mps, the air filter started at onset_s.
+
+    min_mapping is the least ratio of statistic to error: F2/E [1/s] for gast-d, non-centrality/E [1/m] for the others.
     """
     from gbas_studies.ccd.monitors import error_on_of
     from gbas_studies.ccd.smoothed_error import Smoothing, start_of

@@ -15,9 +15,10 @@ A divergence like the ionosphere's, (1, gamma, -1, -gamma) on codes and carriers
 
 The receiver clock of a satellite is the mean over the *other* satellites of its constellation. Filters are linear, so
 it is removed in two steps: the mean of all before the filters, and what the others have left of it behind them, which
-comes to the same. A fault as large as d would appear on n others as -d/n; behind the filters a satellite under
-suspicion is taken out of the others' clock together with all it has done to it. Suspicion falls on the satellite with
-the largest metric above the threshold, then on the next, as long as any is above.
+comes to the same. A fault as large as d would appear on n others as -d/n, and pass the threshold there first if their
+sigma is smaller. Behind the filters a satellite under suspicion is therefore taken out of the others' clock, together
+with all it has done to it. When a satellite fails, suspicion falls on the largest carrier rate of its constellation,
+and stays there if it halves what is above the threshold; then on the next.
 
 A channel that misses epochs bridges the gap with the mean accumulated meanwhile.
 
@@ -233,16 +234,30 @@ def two_frequency_step(
     counts = settled(codes, params.filters).all(axis=0) & settled(new.carrier, params.filters)
     suspect = np.zeros(N_SATS, dtype=bool)
     result = _judged(code_rates, carrier_rate, counts, suspect, epoch, params)
-    for _ in range(_MOST_SUSPECTS):
-        candidates = result.sound.failed & ~suspect & (counts & epoch.clock_used).any(axis=0)
-        if not candidates.any():
-            break
-        suspect[np.where(candidates, result.sound.statistic, -np.inf).argmax()] = True
-        without = _judged(code_rates, carrier_rate, counts, suspect, epoch, params)
-        if not np.isfinite(without.sound.statistic[result.sound.failed]).all():
-            break  # too few are left to judge what has failed: it stays so
-        result = without
+    for group in CLOCK_GROUPS:
+        for _ in range(_MOST_SUSPECTS):
+            if not (result.sound.failed & group & ~suspect).any():
+                break
+            more = suspect | _most_deviant(result, group & epoch.clock_used.any(axis=0) & ~suspect)
+            without = _judged(code_rates, carrier_rate, counts, more, epoch, params)
+            judged = np.isfinite(without.sound.statistic[result.sound.failed]).all()
+            rest = group & ~more
+            if not judged or _excess(without, rest) > 0.5 * _excess(result, rest):
+                break  # too few are left to judge what has failed, or it was not the clock
+            suspect, result = more, without
     return replace(new, codes=codes), result
+
+
+def _most_deviant(result: TwoFrequencyEpoch, candidates: BoolArray) -> BoolArray:
+    """The monitored candidate with the largest carrier rate, as a mask."""
+    size = np.where(candidates & (result.receivers > 0), np.abs(result.mean_mps[3]), -1.0)
+    found: BoolArray = (np.arange(N_SATS) == size.argmax()) & (size >= 0.0)
+    return found
+
+
+def _excess(result: TwoFrequencyEpoch, satellites: BoolArray) -> float:
+    """Sum of the failed metrics of some satellites."""
+    return float(result.sound.statistic[result.sound.failed & satellites].sum())
 
 
 def _judged(

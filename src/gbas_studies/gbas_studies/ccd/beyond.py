@@ -40,6 +40,7 @@ NOISE_M: Final = np.array([0.3, 0.2, 0.003, 0.003])
 """White noise of code L1, code L5, carrier L1, carrier L5 in the importance sampling [m]."""
 _LEVELS: Final = (1e-3, 1e-6, 1e-9)
 _STANDARD_ERRORS: Final = 4.0
+_TICKS_MPS: Final = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1)
 _NAMES: Final = {"gast-d L1": "GAST D, L1", "gast-d L5": "GAST D, L5", "gast-f-paper": "GAST F, paper",
                  "gast-f-sound": "GAST F, sound"}  # fmt: skip
 
@@ -244,13 +245,18 @@ def _times_picture(found: Sequence[Detection], base: Base, satellite: int) -> Pi
             axis.plot(list(dots), [values[0] for values in dots.values()], "o", color=COLOURS[place], markersize=5)
         axis.set_xscale("log")
         axis.set_yscale("log")
+        axis.set_xlim(rates[0], rates[-1])
+        axis.set_xticks(_TICKS_MPS, [f"{tick:g}" for tick in _TICKS_MPS])
+        axis.set_xticks([], minor=True)
         axis.set_xlabel("rate of divergence d [m/s]")
         title = "GAST F, sound, calibrated" if monitor == "gast-f-sound" else "GAST D, band of the fault"
         axis.set_title(title, fontsize=10)
     figure.axes[0].set_ylabel("time from onset to alarm [s]")
     figure.axes[0].legend(fontsize="small")
     figure.axes[0].set_ylim(1.0, 200.0)
+    figure.axes[0].yaxis.set_major_formatter("{x:g}")
     return Picture(
         name="detection-times", title="Time to the alarm", figure=figure, data=data,
-        caption=f"Simulated faults on {SAT_IDS[satellite]} (dots) and the closed form without noise (lines).",
+        caption=f"Simulated faults on {SAT_IDS[satellite]} (dots) and the closed form without noise (lines). Modes "
+        "with the same statistic lie on each other.",
     )  # fmt: skip

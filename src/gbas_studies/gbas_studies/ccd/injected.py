@@ -240,8 +240,8 @@ def campaign(
 
 
 def front_over_station(gradient: float = 300e-6, speed_mps: float = 100.0, *, start_s: float = 400.0) -> WedgeFront:
-    """A front that reaches the station's paths after the monitors have settled; its delay grows by g v a second."""
+    """A front that reaches the station at `start_s`; from then on delays grow by g v a second."""
     return WedgeFront(
         gradient=gradient, width_m=50_000.0, edge="leading", direction_rad=0.0, speed_mps=speed_mps,
-        start_m=-5_000.0, start_s=start_s,
+        start_m=0.0, start_s=start_s,
     )  # fmt: skip

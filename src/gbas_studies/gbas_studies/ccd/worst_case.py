@@ -158,6 +158,8 @@ def smallest_mapping(found: Response, rates_mps: FloatArray) -> Worst:
     :func:`scale_free_mapping`.
     """
     power = 1 if found.monitor.freedom == 0 else 2
+    if power == 1:
+        rates_mps = rates_mps[:1]  # the same for every rate, but for rounding
     error = rates_mps[:, np.newaxis] * found.error_s
     statistic = (rates_mps[:, np.newaxis] * found.statistic) ** power
     mapping = np.where(error > LEAST_ERROR_M, statistic / np.maximum(error, LEAST_ERROR_M), np.inf)

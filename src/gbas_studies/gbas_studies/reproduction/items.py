@@ -37,7 +37,7 @@ _WORDS = {
     Verdict.REPRODUCED: "reproduced to the printed digits",
     Verdict.CLOSE: "close, within a stated tolerance",
     Verdict.POINT: "printed value is that of one point, not of the extremum it is given for",
-    Verdict.DIFFERS: "differs, for the reason given",
+    Verdict.DIFFERS: "differs or does not hold, for the reason given",
     Verdict.OTHER: "measured on other data than the paper's: not comparable digit by digit",
     Verdict.NEW: "not in the paper",
     Verdict.LEFT_OUT: "left out, for the reason given",
