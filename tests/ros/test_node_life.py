@@ -147,8 +147,6 @@ def test_signal_during_the_start_ends_the_program(launcher: Any, probe: Any) -> 
 
 def test_parameters_are_visible_with_their_values_and_read_only(launcher: Any, probe: Any) -> None:
     launcher.start(MONITOR, {"ground": STATION, "join_timeout_s": 7})
-    get = probe.node.create_client(GetParameters, "/gbas/integrity_monitor/get_parameters")
-    probe.until(get.service_is_ready, "the parameter service")
     names = [
         "join_timeout_s",
         "start_wait_s",
@@ -156,32 +154,26 @@ def test_parameters_are_visible_with_their_values_and_read_only(launcher: Any, p
         "ground.monitors.k_b",
         "ground.receivers.rr2_ecef_m",
     ]
-    future = get.call_async(GetParameters.Request(names=names))
-    probe.until(future.done, "an answer")
-    values = future.result().values
+    request = GetParameters.Request(names=names)
+    values = probe.ask(GetParameters, "/gbas/integrity_monitor/get_parameters", request).values
     assert [v.double_value for v in values[:2]] == [7.0, 10.0]
     assert values[2].string_value == "TEST"
     assert values[3].double_value == 5.5  # the default of the dataclass
     assert list(values[4].double_array_value) == STATION["receivers"]["rr2_ecef_m"]
 
-    change = probe.node.create_client(SetParameters, "/gbas/integrity_monitor/set_parameters")
-    probe.until(change.service_is_ready, "the parameter service")
     value = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=1.0)
-    future = change.call_async(SetParameters.Request(parameters=[Parameter(name="join_timeout_s", value=value)]))
-    probe.until(future.done, "an answer")
-    assert not future.result().results[0].successful
+    request = SetParameters.Request(parameters=[Parameter(name="join_timeout_s", value=value)])
+    assert not probe.ask(SetParameters, "/gbas/integrity_monitor/set_parameters", request).results[0].successful
 
 
 def test_configuration_file_with_parameters_over_it(launcher: Any, probe: Any, tmp_path: Path) -> None:
     path = tmp_path / "receiver.yaml"
     path.write_text("airborne:\n  settle_s: 50.0\n  rpds: 3\n")
     launcher.start(PROTECTION, {"config": str(path), "airborne": {"rpds": 5}})
-    get = probe.node.create_client(GetParameters, "/gbas/protection_level/get_parameters")
-    probe.until(get.service_is_ready, "the parameter service")
-    future = get.call_async(GetParameters.Request(names=["airborne.settle_s", "airborne.rpds"]))
-    probe.until(future.done, "an answer")
-    assert future.result().values[0].double_value == 50.0
-    assert future.result().values[1].integer_value == 5
+    request = GetParameters.Request(names=["airborne.settle_s", "airborne.rpds"])
+    values = probe.ask(GetParameters, "/gbas/protection_level/get_parameters", request).values
+    assert values[0].double_value == 50.0
+    assert values[1].integer_value == 5
 
 
 def qos_seen(probe: Any, topic: str, what: str) -> Any:

@@ -92,12 +92,28 @@ class TwoFrequencySection(Declared):
         "ccd_f", "common_covariance", _triangle(StatisticCovariance().common), "(m/s)^2",
         "likewise: part that the receivers share; the default is the published bound", low=-1.0, high=1.0,
     )  # fmt: skip
+    elevation_rad: tuple[float, ...] = parameter(
+        "ccd_f", "elevation_deg", (), "deg", "nodes of the factors, rising; empty: no dependence on elevation",
+        low=0.0, high=90.0, per_unit=_DEGREE,
+    )  # fmt: skip
+    factor_df: tuple[float, ...] = parameter(
+        "ccd_f", "factor_df", (), "-", "on the standard deviation of DF at the nodes", low=0.01, high=100.0
+    )
+    factor_df_other: tuple[float, ...] = parameter(
+        "ccd_f", "factor_df_other", (), "-", "of DF of the other band", low=0.01, high=100.0
+    )
+    factor_if_carrier: tuple[float, ...] = parameter(
+        "ccd_f", "factor_if_carrier", (), "-", "of the IF carrier", low=0.01, high=100.0
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()
         for name in ("receiver_covariance", "common_covariance"):
             if len(getattr(self, name)) != _TRIANGLE:
                 raise ParameterError(f"ccd_f.{name} = {getattr(self, name)} is not {_TRIANGLE} numbers")
+        for name in ("factor_df", "factor_df_other", "factor_if_carrier"):
+            if len(getattr(self, name)) != len(self.elevation_rad):
+                raise ParameterError(f"ccd_f.{name} = {getattr(self, name)} is not one number a node of elevation_deg")
         try:
             self._covariance()
         except ValueError as error:
@@ -115,7 +131,13 @@ class TwoFrequencySection(Declared):
         )
 
     def _covariance(self) -> StatisticCovariance:
-        return StatisticCovariance(receiver=_matrix(self.receiver_covariance), common=_matrix(self.common_covariance))
+        factors = (self.factor_df, self.factor_df_other, self.factor_if_carrier)
+        return StatisticCovariance(
+            receiver=_matrix(self.receiver_covariance),
+            common=_matrix(self.common_covariance),
+            elevation_rad=self.elevation_rad,
+            factor=tuple(zip(*factors, strict=True)),
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
