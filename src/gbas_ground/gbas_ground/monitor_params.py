@@ -31,6 +31,7 @@ _DEGREE: Final = math.pi / 180.0
 _PROBABILITY: Final = {"low": 1e-12, "high": 0.1}
 FALSE_EXCLUSION_OF_ALL: Final = 2e-7
 """Budget of false exclusions of one source in 15 s by all monitors together. Known: a twentieth of it for each."""
+LARGEST_ZENITH_DELAY_M: Final = 5.0  # what the two-band monitor takes; air has 2.2 to 2.8 m
 _TRIANGLE: Final = 6
 _UPPER: Final = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 
@@ -81,9 +82,6 @@ class TwoFrequencySection(Declared):
     min_clock_satellites: int = parameter(
         "ccd_f", "min_clock_satellites", 3, "-", "others a receiver's clock is averaged from", low=1, high=35
     )
-    zenith_delay_m: float = parameter(
-        "ccd_f", "zenith_delay_m", 2.4, "m", "troposphere removed from the carrier", low=0.0, high=5.0
-    )
     receiver_covariance: tuple[float, ...] = parameter(
         "ccd_f", "receiver_covariance", (0.0,) * 6, "(m/s)^2",
         "of DF, DF other, IF carrier, upper triangle by rows: part of each receiver", low=-1.0, high=1.0,
@@ -119,14 +117,14 @@ class TwoFrequencySection(Declared):
         except ValueError as error:
             raise ParameterError(f"ccd_f: {error}") from None
 
-    def params(self, filters: DivergenceParams) -> TwoFrequencyParams:
-        """Parameters of the monitor; its filters are those of the single-band one."""
+    def params(self, filters: DivergenceParams, zenith_delay_m: float) -> TwoFrequencyParams:
+        """Parameters of the monitor; its filters are those of the single-band one, its troposphere the station's."""
         return TwoFrequencyParams(
             other=BAND_INDEX[self.other],
             filters=filters,
             p_false_alarm=self.p_false_alarm,
             min_clock_satellites=self.min_clock_satellites,
-            zenith_delay_m=self.zenith_delay_m,
+            zenith_delay_m=min(zenith_delay_m, LARGEST_ZENITH_DELAY_M),
             covariance=self._covariance(),
         )
 

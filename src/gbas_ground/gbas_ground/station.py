@@ -310,13 +310,14 @@ def _process(
     settled = _settled(tracks, correction, should, params)
     channel_ok = tracked & ~np.logical_or.reduce([check.failed for _, check in checks])
     usable = channel_ok & new_exclusions.usable_channels()
+    high = should.elevation_rad >= params.elevation_mask_rad
     due = ((usable & settled).sum(axis=0) >= params.min_receivers) & np.isfinite(known.crc)
     seen = Seen(
         code_m=clean.code_m,
         carrier_m=tracks.carrier_m,
         cn0_dbhz=clean.cn0_dbhz,
         slipped=tracks.slipped,
-        usable=usable & ~new_exclusions.satellites.excluded,
+        usable=usable & high & ~new_exclusions.satellites.excluded,
         ready=usable & settled,
         in_use=state.satellites == ChannelState.USABLE,
         due=due,

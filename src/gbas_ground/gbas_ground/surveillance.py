@@ -88,7 +88,7 @@ class Seen(NamedTuple):
     slipped : (R, N_BANDS, N) bool array
         Where a carrier and the one before do not belong together.
     usable : (R, N) bool array
-        Channels that are tracked and that nothing excludes, nor their satellite.
+        Channels of satellites above the mask that are tracked, and that nothing excludes, nor their satellite.
     ready : (R, N) bool array
         Channels whose smoothing filter has settled, and whose receiver is not excluded either.
     in_use : (N,) bool array
@@ -210,7 +210,7 @@ def _settings(params: GroundParams) -> _Settings:
     ccd = sections.ccd.params(params.settle_time_s, params.max_gap_s)
     return _Settings(
         ccd=ccd,
-        ccd_f=sections.ccd_f.params(ccd.filters),
+        ccd_f=sections.ccd_f.params(ccd.filters, params.refractivity * 1e-6 * params.scale_height_m),
         acceleration=sections.acceleration.params(params.max_gap_s),
         gradient=gradient,
         gradient_required=sections.gradient.required or params.gast_d,
