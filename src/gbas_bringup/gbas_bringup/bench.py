@@ -13,6 +13,7 @@ process     ``gbas process`` on recorded files as a multiple of real time, and a
 latency     live nodes at 2 Hz: from observations to bursts and to protection levels, against 50 ms
 replay      live nodes with a recorder, data as fast as they are taken, against 100 times real time at 2 Hz
 files       the same with recorded receiver files
+monitors    all monitors of the station at one epoch with forty satellites, against 2 ms
 ccd         the full sweep of the divergence study against 1 s, and its monitors against 2 ms an epoch
 ==========  ===========================================================================================================
 
@@ -35,7 +36,7 @@ from gbas_bringup.bench_figures import Part, document, environment
 from gbas_bringup.cli_base import data_folder
 from gbas_bringup.errors import GbasError
 
-PARTS: Final = ("steps", "simulator", "ccd", "siting", "offline", "process", "latency", "replay", "files")
+PARTS: Final = ("steps", "monitors", "simulator", "ccd", "siting", "offline", "process", "latency", "replay", "files")
 LATENCY_S: Final = 40.0
 QUICK_LATENCY_S: Final = 8.0
 _STEP_EPOCHS: Final = (300, 60)
@@ -99,7 +100,7 @@ def run_bench(
 
 def _measures(out: Path, quick: bool, seconds: float | None, data: Path | None) -> Mapping[str, Callable[[], Part]]:
     """What measures each part; the libraries are loaded when they are needed."""
-    from gbas_bringup import bench_ccd, bench_live, bench_offline, bench_peer, bench_sim, bench_siting
+    from gbas_bringup import bench_ccd, bench_live, bench_monitors, bench_offline, bench_peer, bench_sim, bench_siting
 
     make_flight = cache(bench_offline.make_flight)
     step_epochs = bench_offline.SETTLE_EPOCHS + _STEP_EPOCHS[quick]
@@ -113,6 +114,7 @@ def _measures(out: Path, quick: bool, seconds: float | None, data: Path | None) 
         "latency": lambda: bench_live.measure_latency(out / "latency", seconds=latency_s),
         "replay": lambda: bench_live.measure_replay(out / "replay", n_epochs=_REPLAY_EPOCHS[quick]),
         "files": lambda: bench_live.measure_files(out / "files", data),
+        "monitors": lambda: bench_monitors.measure_monitors(_STEP_EPOCHS[quick]),
         "ccd": lambda: bench_ccd.measure_ccd(_MONITOR_EPOCHS[quick]),
     }
 

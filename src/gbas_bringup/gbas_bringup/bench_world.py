@@ -38,21 +38,21 @@ def bench_config() -> Path:
     return config_path(CONFIG)
 
 
-def bench_world() -> World:
+def bench_world(satellites_a_system: int = SATELLITES_A_SYSTEM) -> World:
     """The world of the benchmark's configuration."""
-    return crowded(scenario_from_yaml(bench_config()))
+    return crowded(scenario_from_yaml(bench_config()), satellites_a_system)
 
 
-def crowded(params: WorldParams) -> World:
-    """A world in which :data:`SATELLITES_A_SYSTEM` GPS and as many Galileo satellites are seen at every epoch."""
-    turned = _turned(open_orbits(params).received[0], params)
+def crowded(params: WorldParams, satellites_a_system: int = SATELLITES_A_SYSTEM) -> World:
+    """A world in which so many GPS and as many Galileo satellites are seen at every epoch."""
+    turned = _turned(open_orbits(params).received[0], params, satellites_a_system)
     return World(params, orbits=Orbits(truth=(turned,), switch_s=(), received=(turned,)))
 
 
-def _turned(nominal: Ephemeris, params: WorldParams) -> Ephemeris:
+def _turned(nominal: Ephemeris, params: WorldParams, satellites_a_system: int) -> Ephemeris:
     """Ephemerides of the satellites kept, each turned to where it is high at all times of the run."""
     kept = np.zeros(N_SATS, dtype=bool)
-    kept[:SATELLITES_A_SYSTEM] = kept[N_GPS : N_GPS + SATELLITES_A_SYSTEM] = True
+    kept[:satellites_a_system] = kept[N_GPS : N_GPS + satellites_a_system] = True
     turns = np.arange(_STEPS) * (2.0 * np.pi / _STEPS)
     node, along = (turn.reshape(-1, 1) for turn in np.meshgrid(turns, turns, indexing="ij"))
     turned = _with(nominal, omega0_rad=nominal.omega0_rad + node, m0_rad=nominal.m0_rad + along)

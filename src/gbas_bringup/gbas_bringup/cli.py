@@ -301,7 +301,7 @@ def bench(
     part: Annotated[
         list[str] | None,
         typer.Option(
-            help="One of steps, simulator, ccd, siting, offline, process, latency, replay, files; may be repeated."
+            help="One of steps, monitors, simulator, ccd, siting, offline, process, latency, replay, files; repeatable."
         ),
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Short runs: less exact.")] = False,

@@ -345,24 +345,34 @@ def _acceleration(
     known = np.isfinite(found.satellites.statistic[0, 0])
     each = [_row(found.satellites, number) for number in range(len(_CARRIER_CAUSES))]
     looks = {name: look(result, seen.due) for (name, _), result in zip(_CARRIER_CAUSES, each, strict=True)}
-    worst = worst_of(found.satellites, axes=2)
-    number = place_of_worst(found.satellites, axes=2)[0]
-    cause = np.array([cause for _, cause in _CARRIER_CAUSES])[number]
-    failed = seen.due & known & found.failed_satellites
-    satellites = tuple(Verdict(name, replace(worst, failed=failed & (cause == name))) for _, name in _CARRIER_CAUSES)
-    channels = (Verdict(ExclusionCause.CARRIER_ACCELERATION, _channels(found)),)
     return state, _Part(
         looks=looks,
-        satellites=satellites if exclude else (),
-        channels=channels if exclude else (),
+        satellites=_carrier_verdicts(found, seen.due & known) if exclude else (),
+        channels=_channel_verdicts(found) if exclude else (),
         ready=known if exclude else None,
     )
 
 
-def _channels(found: CarrierAccelerationResult) -> MonitorResult:
-    """The worst statistic of each channel, ``(R, N)``; one that is missing makes nobody fail, but is not ready."""
+def _carrier_verdicts(found: CarrierAccelerationResult, due: BoolArray) -> tuple[Verdict, ...]:
+    """A satellite's cause is the statistic that is furthest over its threshold."""
+    failed = due & found.failed_satellites
+    if not failed.any():
+        return ()
+    worst = worst_of(found.satellites, axes=2)
+    number, _ = place_of_worst(found.satellites, axes=2)
+    return tuple(
+        Verdict(cause, replace(worst, failed=failed & (number == place)))
+        for place, (_, cause) in enumerate(_CARRIER_CAUSES)
+    )
+
+
+def _channel_verdicts(found: CarrierAccelerationResult) -> tuple[Verdict, ...]:
+    """The worst statistic of each channel; one that is missing makes nobody fail, but is not ready."""
+    if not found.failed_channels.any():
+        return ()
     worst = worst_of(_moved(found.channels, 2, 1), axes=2)
-    return replace(worst, failed=found.failed_channels & (worst.statistic > worst.threshold))
+    failed = found.failed_channels & (worst.statistic > worst.threshold)
+    return (Verdict(ExclusionCause.CARRIER_ACCELERATION, replace(worst, failed=failed)),)
 
 
 def _double_differences(
@@ -411,11 +421,13 @@ def _power(
     )
     worst = worst_of(found.satellites, axes=1)
     satellites = replace(worst, failed=np.logical_or.reduce(found.satellites.failed))
-    channels = worst_of(_moved(found.channels, 1, 0), axes=1)
+    channels: tuple[Verdict, ...] = ()
+    if exclude and found.channels.failed.any():
+        channels = (Verdict(ExclusionCause.EXPECTED_POWER, worst_of(_moved(found.channels, 1, 0), axes=1)),)
     return state, _Part(
         looks={"expected_power": look(satellites, np.logical_or.reduce(due))},
         satellites=_verdicts(exclude, (ExclusionCause.EXPECTED_POWER, satellites), seen.due),
-        channels=(Verdict(ExclusionCause.EXPECTED_POWER, channels),) if exclude else (),
+        channels=channels,
     )
 
 
