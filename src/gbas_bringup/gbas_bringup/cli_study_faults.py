@@ -99,7 +99,7 @@ def _print(documents: Sequence[dict[str, Any]]) -> None:
         table.add_row(each["case"], found, burst, limit, alert, causes)
     Console(highlight=False, width=None if Console().is_terminal else 160).print(table)
     false = sum(each["false_exclusions"] for each in documents)
-    print(f"satellites excluded that have no fault: {false}")
+    print(f"exclusions of what has no fault: {false}")
 
 
 def _alert(latest_s: float | None, undetected: int) -> str:

@@ -221,15 +221,15 @@ def _orbit(rate_mps: float, satellite: str, onset_s: float) -> tuple[Threat, ...
 def receiver_cases() -> Iterator[Case]:
     """Faults of one reference receiver; the protection level under its fault bounds them until they are found."""
     makers: dict[str, MakeThreats] = {
-        "codes 1 m long": partial(_ranges, 1.0, 0.0, ("code_l1", "code_l5")),
-        "codes 5 m long": partial(_ranges, 5.0, 0.0, ("code_l1", "code_l5")),
-        "codes, 0.05 m/s": partial(_ranges, 0.0, 0.05, ("code_l1", "code_l5")),
-        "carriers, 0.05 m/s": partial(_ranges, 0.0, 0.05, ("carrier_l1", "carrier_l5")),
+        "code 1 m long": partial(_ranges, 1.0, 0.0, ("code_l1", "code_l5")),
+        "code 5 m long": partial(_ranges, 5.0, 0.0, ("code_l1", "code_l5")),
+        "code, 0.05 m/s": partial(_ranges, 0.0, 0.05, ("code_l1", "code_l5")),
+        "carrier, 0.05 m/s": partial(_ranges, 0.0, 0.05, ("carrier_l1", "carrier_l5")),
         "noise of 3 m": _noise,
         "frozen": _frozen,
     }
     for name, maker in makers.items():
-        yield Case(kind="receiver", name=f"one channel or receiver: {name}", threats=maker, subject=RECEIVER)
+        yield Case(kind="receiver", name=f"{RECEIVER} {name}", threats=maker, subject=RECEIVER)
 
 
 def _ranges(
@@ -353,23 +353,43 @@ def run_campaign(
     if world.length_s < QUIET_S + longest + 1.0:
         needed_s = QUIET_S + longest + 1.0
         raise StudyError(f"the world is {world.length_s:g} s long, and the longest case needs {needed_s:g} s")
+    if workers == 1:
+        stations = _stations(world, station, watch)
+        results = map(partial(_run_case, stations, trials), cases)
+        return list(_counted(results, len(cases), progress))
+    # A settled station does not travel between processes: each worker settles its own, with the same bits.
+    with ProcessPoolExecutor(
+        workers, mp_context=get_context("spawn"), initializer=_prepare, initargs=(world, station, watch)
+    ) as pool:
+        return list(_counted(pool.map(partial(_run_prepared, trials), cases), len(cases), progress))
+
+
+def _counted(results: Iterable[Outcome], total: int, progress: Callable[[int, int], None]) -> Iterator[Outcome]:
+    for done, outcome in enumerate(results, start=1):
+        progress(done, total)
+        yield outcome
+
+
+def _stations(world: WorldParams, station: GroundParams, watch: bool) -> list[Settled]:
+    """The station that acts and, if wanted, the one that only watches, both settled."""
     acting = settle(world, station, QUIET_S)
     if not acting.usable:
         raise StudyError("the station has no usable satellite after the quiet start")
-    stations = [acting]
-    if watch:
-        stations.append(settle(world, replace(station, monitors=_watching(station.monitors)), QUIET_S))
-    outcomes: list[Outcome] = []
-    if workers == 1:
-        for case in cases:
-            outcomes.append(_run_case(stations, trials, case))
-            progress(len(outcomes), len(cases))
-        return outcomes
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        for outcome in pool.map(partial(_run_case, stations, trials), cases, chunksize=4):
-            outcomes.append(outcome)
-            progress(len(outcomes), len(cases))
-    return outcomes
+    if not watch:
+        return [acting]
+    return [acting, settle(world, replace(station, monitors=_watching(station.monitors)), QUIET_S)]
+
+
+_prepared: list[Settled] = []
+"""The settled stations of a worker process."""
+
+
+def _prepare(world: WorldParams, station: GroundParams, watch: bool) -> None:
+    _prepared[:] = _stations(world, station, watch)
+
+
+def _run_prepared(trials: int, case: Case) -> Outcome:
+    return _run_case(_prepared, trials, case)
 
 
 def _watching(monitors: MonitorParams) -> MonitorParams:
@@ -395,7 +415,9 @@ def _run_case(stations: Sequence[Settled], trials: int, case: Case) -> Outcome:
         onset_s = acting.time_s + interval_s * (1.0 + (trial + 1) * 0.6180339887498949 % 1.0)
         threats = case.threats(satellite, onset_s)
         subject = case.subject or satellite
-        reactions.append(inject(acting, threats, subject, onset_s, case.watch_s))
+        reaction = inject(acting, threats, subject, onset_s, case.watch_s)
+        # a receiver's fault may show on the satellite it is on
+        reactions.append(replace(reaction, others=tuple(each for each in reaction.others if each != satellite)))
         watched += [inject(each, threats, subject, onset_s, case.watch_s) for each in stations[1:]]
     return _outcome(case, reactions, watched)
 
