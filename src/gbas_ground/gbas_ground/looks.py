@@ -18,11 +18,12 @@ IntArray = NDArray[np.intp]
 
 
 class Look(NamedTuple):
-    """One monitor's view of the satellites: statistic, threshold, :class:`MonitorState`, each ``(N,)``."""
+    """One monitor's view of the satellites, each ``(N,)``: statistic, threshold, what failed, and what was due."""
 
     statistic: FloatArray
     threshold: FloatArray
-    state: FloatArray
+    failed: BoolArray
+    due: BoolArray
 
 
 def place_of_worst(result: MonitorResult, *, axes: int) -> tuple[IntArray, ...]:
@@ -70,14 +71,7 @@ def look(result: MonitorResult, due: BoolArray) -> Look:
     axes = result.statistic.ndim - 1
     worst = worst_of(result, axes=axes) if axes else result
     expected = due if due.ndim == 1 else np.logical_or.reduce(due.reshape(-1, N_SATS))
-    looked = np.isfinite(worst.statistic + worst.threshold)
-    seen = np.where(looked, float(MonitorState.PASSED), float(MonitorState.NOT_MONITORED))
-    state = np.where(expected, seen, float(MonitorState.NOT_DUE))
-    return Look(
-        statistic=np.where(looked, worst.statistic, np.nan),
-        threshold=np.where(looked, worst.threshold, np.nan),
-        state=np.where(worst.failed, float(MonitorState.FAILED), state),
-    )
+    return Look(worst.statistic, worst.threshold, worst.failed, expected)
 
 
 def monitor_epoch(
@@ -101,11 +95,20 @@ def monitor_epoch(
         Satellites that have a row.
     """
     count = len(GROUND_MONITORS)
-    statistic, threshold, state = missing(count), missing(count), np.zeros((count, N_SATS))
+    statistic, threshold = missing(count), missing(count)
+    failed, due = np.zeros((count, N_SATS), dtype=bool), np.zeros((count, N_SATS), dtype=bool)
     for row, name in enumerate(GROUND_MONITORS):
         if name in looks:
-            statistic[row], threshold[row], state[row] = looks[name]
-    fields = {"statistic": statistic, "threshold": threshold, "state": state, **details}
+            statistic[row], threshold[row], failed[row], due[row] = looks[name]
+    looked = np.isfinite(statistic + threshold)
+    state = np.where(looked, float(MonitorState.PASSED), float(MonitorState.NOT_MONITORED))
+    state = np.where(due, state, float(MonitorState.NOT_DUE))
+    fields = {
+        "statistic": np.where(looked, statistic, np.nan),
+        "threshold": np.where(looked, threshold, np.nan),
+        "state": np.where(failed, float(MonitorState.FAILED), state),
+        **details,
+    }
     return MonitorEpoch(
         gps_week=gps_week, tow_s=tow_s, **{name: np.where(shown, value, np.nan) for name, value in fields.items()}
     )
