@@ -12,13 +12,7 @@ from gbas_core.ephemeris import Ephemeris
 from gbas_core.gpstime import add_seconds
 from gbas_core.observations import ObservationEpoch
 from gbas_core.record import FloatArray
-from gbas_ground.monitor_params import (
-    AccelerationSection,
-    CcdSection,
-    GradientSection,
-    MonitorParams,
-    TwoFrequencySection,
-)
+from gbas_ground.monitor_params import MonitorParams
 from gbas_ground.params import GroundParams
 from gbas_ground.station import GroundEpoch, GroundStation, StationState, initial_state
 from gbas_msgs_py.events import Event
@@ -51,12 +45,7 @@ def params(receivers: int = 4, **changes: Any) -> GroundParams:
 
 def watching_monitors() -> MonitorParams:
     """Monitors of signals that exclude nothing, so that others can be seen alone."""
-    return MonitorParams(
-        ccd=CcdSection(exclude=False),
-        ccd_f=TwoFrequencySection(exclude="none"),
-        acceleration=AccelerationSection(exclude=False),
-        gradient=GradientSection(exclude=False),
-    )
+    return MonitorParams().watching()
 
 
 @dataclass

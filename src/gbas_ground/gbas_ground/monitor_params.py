@@ -8,7 +8,7 @@ satellite that the monitor ought to judge and cannot may be used.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from gbas_core.divergence import GROUND_SIGMA_MPS, GROUND_THRESHOLD_MPS, DivergenceParams
@@ -403,3 +403,16 @@ class MonitorParams(Declared):
         if sum(shares.values()) > FALSE_EXCLUSION_OF_ALL:
             given = ", ".join(f"{name}.p_false_alarm = {share:g}" for name, share in shares.items())
             raise ParameterError(f"{given} are together more than the budget of {FALSE_EXCLUSION_OF_ALL:g} in 15 s")
+
+    def watching(self) -> MonitorParams:
+        """The same, with no monitor of signals or of B values over time that excludes."""
+        return replace(
+            self,
+            ccd=replace(self.ccd, exclude=False),
+            ccd_f=replace(self.ccd_f, exclude="none"),
+            acceleration=replace(self.acceleration, exclude=False),
+            gradient=replace(self.gradient, exclude=False),
+            ephemeris=replace(self.ephemeris, exclude=False),
+            power=replace(self.power, exclude=False),
+            sigma=replace(self.sigma, exclude=False),
+        )

@@ -18,7 +18,6 @@ from typing import Any, Final
 
 import numpy as np
 
-from gbas_ground.monitor_params import MonitorParams
 from gbas_ground.params import GroundParams
 from gbas_sim.faults import (
     FAULT_MODES,
@@ -377,7 +376,7 @@ def _stations(world: WorldParams, station: GroundParams, watch: bool) -> list[Se
         raise StudyError("the station has no usable satellite after the quiet start")
     if not watch:
         return [acting]
-    return [acting, settle(world, replace(station, monitors=_watching(station.monitors)), QUIET_S)]
+    return [acting, settle(world, replace(station, monitors=station.monitors.watching()), QUIET_S)]
 
 
 _prepared: list[Settled] = []
@@ -390,20 +389,6 @@ def _prepare(world: WorldParams, station: GroundParams, watch: bool) -> None:
 
 def _run_prepared(trials: int, case: Case) -> Outcome:
     return _run_case(_prepared, trials, case)
-
-
-def _watching(monitors: MonitorParams) -> MonitorParams:
-    """The same monitors, with none that excludes."""
-    return replace(
-        monitors,
-        ccd=replace(monitors.ccd, exclude=False),
-        ccd_f=replace(monitors.ccd_f, exclude="none"),
-        acceleration=replace(monitors.acceleration, exclude=False),
-        gradient=replace(monitors.gradient, exclude=False),
-        ephemeris=replace(monitors.ephemeris, exclude=False),
-        power=replace(monitors.power, exclude=False),
-        sigma=replace(monitors.sigma, exclude=False),
-    )
 
 
 def _run_case(stations: Sequence[Settled], trials: int, case: Case) -> Outcome:
