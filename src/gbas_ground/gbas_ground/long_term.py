@@ -53,9 +53,9 @@ def watch_sigmas(
     looks : dict
     """
     settings, used = _settings(params), made.used & (made.count >= 2)
-    # What is excluded has no B values; its old estimates count until they are forgotten.
+    # What is excluded, alone or with its receiver, has no B values; its old estimates count until they are forgotten.
     remembered = (state.count > 0.0) & (state.since_s + max(dt_s, 0.0) <= settings.forget_s)
-    due = used | (exclusions.channels.excluded & remembered)
+    due = used | (~exclusions.usable_channels() & remembered)
     normalised = normalised_b(made.b_m, made.channel_sigma_m, used)
     state, result = sigma_monitor_step(state, normalised, due, dt_s, settings)
     looks = {"sigma_mean": look(result.mean, used), "sigma_spread": look(result.variance, used)}
