@@ -87,7 +87,7 @@ def _channels(
 ) -> _Entries:
     """Channels ``(R, N)``: what is wrong with a channel itself comes before what is wrong with its satellite."""
     by_receiver = np.broadcast_to(exclusions.receivers.excluded[:, np.newaxis], tracked.shape)
-    settling = np.isfinite(tracks.age_s) & ~measured.ready & (condition.cause != ExclusionCause.BELOW_MASK)
+    settling = np.isfinite(tracks.age_s) & ~measured.settled & (condition.cause != ExclusionCause.BELOW_MASK)
     usable = made.used & (condition.state == ChannelState.USABLE)
     reasons = (
         (exclusions.channels.excluded, exclusions.channels.state, exclusions.channels.cause),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -52,6 +53,8 @@ from gbas_ground.tracking import RawEpoch, TrackGroup, Tracks, initial_tracking,
 from gbas_msgs_py.events import Event, EventKind
 from gbas_msgs_py.records import ChannelEpoch, ChannelState, IntegrityEpoch, MonitorEpoch
 from gbas_msgs_py.vdb.burst import Burst
+
+_Checks = Sequence[tuple[ExclusionCause, MonitorResult]]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -298,58 +301,43 @@ def _process(
     _receiver_events(state, raw, events)
     exclusions = _released(state.exclusions, params, events)
 
-    should = expected(known.current, epoch.gps_week, epoch.tow_s, raw.code_m[:, L1], site)
-    tracked = np.isfinite(raw.code_m[:, L1] + raw.carrier_m[:, L1])
-    checks = _channel_checks(raw, should, tracked, params)
-    new_exclusions = _exclude_channels(exclusions, checks, events)
-    new_exclusions = _exclude_receivers(new_exclusions, checks[0][1], params, events)
-    clean = _without(raw, checks[0][1].failed)
-    tracking, tracks = track(state.tracking, clean, key, _comparable_range_m(should, changed), params)
-
-    correction = range_correction_m(should.range_m, tracks.smoothed_m, should.clock_s)
-    settled = _settled(tracks, correction, should, params)
-    channel_ok = tracked & ~np.logical_or.reduce([check.failed for _, check in checks])
-    usable = channel_ok & new_exclusions.usable_channels()
-    high = should.elevation_rad >= params.elevation_mask_rad
-    due = ((usable & settled).sum(axis=0) >= params.min_receivers) & np.isfinite(known.crc)
-    seen = Seen(
-        code_m=clean.code_m,
-        carrier_m=tracks.carrier_m,
-        cn0_dbhz=clean.cn0_dbhz,
-        slipped=tracks.slipped,
-        usable=usable & high & ~new_exclusions.satellites.excluded,
-        ready=usable & settled,
-        in_use=state.satellites == ChannelState.USABLE,
-        due=due,
-        may_refer=due & ~new_exclusions.satellites.excluded,
-        expected=should,
-        rebased=changed,
-        shift_m=_shift_m(state, epoch, should, changed, clean, site),
-        dt_s=dt_s,
-    )
+    followed, new_exclusions = _follow(state, epoch, raw, known, changed, exclusions, params, events)
+    seen = _seen(state, epoch, followed, known, new_exclusions, changed, dt_s, params)
     watching, watched = watch(state.watching, seen, params)
     new_exclusions = _exclude_channels(new_exclusions, watched.channels, events)
     new_exclusions, noticed = _exclude_satellites(new_exclusions, watched)
     measured = Measured(
-        correction_m=correction,
+        correction_m=followed.correction_m,
         previous_m=_previous_corrections(
-            state.before if dt_s <= params.max_gap_s else None, known.current, changed, correction.shape, site
+            state.before if dt_s <= params.max_gap_s else None,
+            known.current,
+            changed,
+            followed.correction_m.shape,
+            site,
         ),
         dt_s=dt_s,
-        settled=settled,
+        settled=followed.settled,
         judged=watched.ready,
-        elevation_rad=should.elevation_rad,
+        elevation_rad=followed.should.elevation_rad,
     )
     made, new_exclusions, findings = agree(measured, new_exclusions, params)
     long_term, new_exclusions, slow, slow_looks = watch_sigmas(state.long_term, made, new_exclusions, dt_s, params)
     findings = (*noticed, *findings, *slow)
     events.found(findings)
-    new_exclusions = _advanced(new_exclusions, measured, made, channel_ok, watched.passed, dt_s, params)
+    new_exclusions = _advanced(new_exclusions, measured, made, followed.channel_ok, watched.passed, dt_s, params)
 
-    condition = conclude(tracked, tracks, known, measured, made, new_exclusions, params)
+    condition = conclude(followed.tracked, followed.tracks, known, measured, made, new_exclusions, params)
     integrity = integrity_of(epoch.gps_week, epoch.tow_s, known, measured, made, condition)
     channels = channel_epoch(
-        epoch.gps_week, epoch.tow_s, tracked, tracks, measured, made, condition, new_exclusions, state.channels
+        epoch.gps_week,
+        epoch.tow_s,
+        followed.tracked,
+        followed.tracks,
+        measured,
+        made,
+        condition,
+        new_exclusions,
+        state.channels,
     )
     serving = bool((condition.state == ChannelState.USABLE).any())
     contributing = (made.used & (condition.state == ChannelState.USABLE)).any(axis=1)
@@ -358,16 +346,16 @@ def _process(
     before = Before(
         gps_week=epoch.gps_week,
         tow_s=epoch.tow_s,
-        code_m=clean.code_m[:, L1],
-        smoothed_m=tracks.smoothed_m,
-        correction_m=correction,
+        code_m=followed.raw.code_m[:, L1],
+        smoothed_m=followed.tracks.smoothed_m,
+        correction_m=followed.correction_m,
     )
     new = MonitorState(
         key=key,
         refused=0,
         refused_key=0,
         ephemerides=known,
-        tracking=tracking,
+        tracking=followed.tracking,
         exclusions=new_exclusions,
         before=before,
         satellites=condition.state,
@@ -379,10 +367,107 @@ def _process(
         watching=watching,
         long_term=long_term,
     )
-    looks = {name: look(result, tracked) for name, (_, result) in zip(("range", "power"), checks, strict=True)}
+    checks = zip(("range", "power"), followed.checks, strict=True)
+    looks = {name: look(result, followed.tracked) for name, (_, result) in checks}
     looks |= {**watched.looks, **consistency_looks(made, params), **slow_looks}
     statistics = monitor_epoch(epoch.gps_week, epoch.tow_s, looks, watched.details, np.isfinite(integrity.state))
     return new, Monitored(integrity=integrity, statistics=statistics, channels=channels, events=events.all())
+
+
+class _Followed(NamedTuple):
+    """What the receivers measured at one epoch, checked, followed over slips and smoothed.
+
+    Attributes
+    ----------
+    raw : RawEpoch
+        Without measurements far from what is expected.
+    should : Expected
+    tracked, channel_ok, settled : (R, N) bool arrays
+        Channels with code and carrier; those that pass the checks of channels; those whose filters have settled.
+    checks : sequence of (cause, result)
+    tracking : tuple of TrackGroup
+    tracks : Tracks
+    correction_m : (tau, R, N) array
+        PR_sc [m].
+    """
+
+    raw: RawEpoch
+    should: Expected
+    tracked: BoolArray
+    channel_ok: BoolArray
+    settled: BoolArray
+    checks: _Checks
+    tracking: tuple[TrackGroup, ...]
+    tracks: Tracks
+    correction_m: FloatArray
+
+
+def _follow(
+    state: MonitorState,
+    epoch: GroundEpoch,
+    raw: RawEpoch,
+    known: EphemerisState,
+    changed: BoolArray,
+    exclusions: Exclusions,
+    params: GroundParams,
+    events: EventLog,
+) -> tuple[_Followed, Exclusions]:
+    """Check the channels, exclude what fails, and smooth the rest."""
+    site, _ = _constants(params)
+    should = expected(known.current, epoch.gps_week, epoch.tow_s, raw.code_m[:, L1], site)
+    tracked = np.isfinite(raw.code_m[:, L1] + raw.carrier_m[:, L1])
+    checks = _channel_checks(raw, should, tracked, params)
+    exclusions = _exclude_channels(exclusions, checks, events)
+    exclusions = _exclude_receivers(exclusions, checks[0][1], params, events)
+    clean = _without(raw, checks[0][1].failed)
+    key = epoch_key(epoch.gps_week, epoch.tow_s)
+    tracking, tracks = track(state.tracking, clean, key, _comparable_range_m(should, changed), params)
+    correction_m = range_correction_m(should.range_m, tracks.smoothed_m, should.clock_s)
+    followed = _Followed(
+        raw=clean,
+        should=should,
+        tracked=tracked,
+        channel_ok=tracked & ~np.logical_or.reduce([check.failed for _, check in checks]),
+        settled=_settled(tracks, correction_m, should, params),
+        checks=checks,
+        tracking=tracking,
+        tracks=tracks,
+        correction_m=correction_m,
+    )
+    return followed, exclusions
+
+
+def _seen(
+    state: MonitorState,
+    epoch: GroundEpoch,
+    followed: _Followed,
+    known: EphemerisState,
+    exclusions: Exclusions,
+    changed: BoolArray,
+    dt_s: float,
+    params: GroundParams,
+) -> Seen:
+    """What the monitors of signals are given."""
+    site, _ = _constants(params)
+    raw, tracks, should = followed.raw, followed.tracks, followed.should
+    usable = followed.channel_ok & exclusions.usable_channels()
+    high = should.elevation_rad >= params.elevation_mask_rad
+    due = ((usable & followed.settled).sum(axis=0) >= params.min_receivers) & np.isfinite(known.crc)
+    return Seen(
+        code_m=raw.code_m,
+        carrier_m=tracks.carrier_m,
+        cn0_dbhz=raw.cn0_dbhz,
+        slipped=tracks.slipped,
+        usable=usable & high & ~exclusions.satellites.excluded,
+        ready=usable & followed.settled,
+        in_use=state.satellites == ChannelState.USABLE,
+        due=due,
+        may_refer=due & ~exclusions.satellites.excluded,
+        expected=should,
+        rebased=changed,
+        shift_m=_shift_m(state, epoch, should, changed, raw, site),
+        dt_s=dt_s,
+    )
 
 
 def _ephemerides(
@@ -438,9 +523,6 @@ def _released(exclusions: Exclusions, params: GroundParams, events: EventLog) ->
         cause = ExclusionCause(int(exclusions.channels.cause[row, satellite]))
         events.add(EventKind.READMISSION, f"rr{row + 1}/{SAT_IDS[satellite]}", cause.word, params.readmission_time_s)
     return Exclusions(channels=channels, receivers=receivers, satellites=satellites)
-
-
-_Checks = Sequence[tuple[ExclusionCause, MonitorResult]]
 
 
 def _channel_checks(raw: RawEpoch, should: Expected, tracked: BoolArray, params: GroundParams) -> _Checks:
