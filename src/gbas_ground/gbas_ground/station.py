@@ -295,7 +295,7 @@ def _process(
 ) -> tuple[MonitorState, Monitored]:
     key = epoch_key(epoch.gps_week, epoch.tow_s)
     dt_s = float("nan") if state.key is None else (key - state.key) / 1000.0
-    site, satellites = _constants(params)
+    _, satellites = _constants(params)
     known, changed = _ephemerides(state, epoch, params, events)
     raw = stack(_of_this_epoch(epoch, events), satellites)
     _receiver_events(state, raw, events)
@@ -306,20 +306,7 @@ def _process(
     watching, watched = watch(state.watching, seen, params)
     new_exclusions = _exclude_channels(new_exclusions, watched.channels, events)
     new_exclusions, noticed = _exclude_satellites(new_exclusions, watched)
-    measured = Measured(
-        correction_m=followed.correction_m,
-        previous_m=_previous_corrections(
-            state.before if dt_s <= params.max_gap_s else None,
-            known.current,
-            changed,
-            followed.correction_m.shape,
-            site,
-        ),
-        dt_s=dt_s,
-        settled=followed.settled,
-        judged=watched.ready,
-        elevation_rad=followed.should.elevation_rad,
-    )
+    measured = _measured(state, followed, watched, known, changed, dt_s, params)
     made, new_exclusions, findings = agree(measured, new_exclusions, params)
     long_term, new_exclusions, slow, slow_looks = watch_sigmas(state.long_term, made, new_exclusions, dt_s, params)
     findings = (*noticed, *findings, *slow)
@@ -343,13 +330,6 @@ def _process(
     contributing = (made.used & (condition.state == ChannelState.USABLE)).any(axis=1)
     _contribution_events(state, contributing, raw, new_exclusions, events)
     _satellite_events(state, condition, serving, findings, events)
-    before = Before(
-        gps_week=epoch.gps_week,
-        tow_s=epoch.tow_s,
-        code_m=followed.raw.code_m[:, L1],
-        smoothed_m=followed.tracks.smoothed_m,
-        correction_m=followed.correction_m,
-    )
     new = MonitorState(
         key=key,
         refused=0,
@@ -357,7 +337,7 @@ def _process(
         ephemerides=known,
         tracking=followed.tracking,
         exclusions=new_exclusions,
-        before=before,
+        before=_before(epoch, followed),
         satellites=condition.state,
         causes=condition.cause,
         present=raw.present,
@@ -467,6 +447,45 @@ def _seen(
         rebased=changed,
         shift_m=_shift_m(state, epoch, should, changed, raw, site),
         dt_s=dt_s,
+    )
+
+
+def _measured(
+    state: MonitorState,
+    followed: _Followed,
+    watched: Watched,
+    known: EphemerisState,
+    changed: BoolArray,
+    dt_s: float,
+    params: GroundParams,
+) -> Measured:
+    """What the corrections are formed from."""
+    site, _ = _constants(params)
+    before = state.before if dt_s <= params.max_gap_s else None
+    return Measured(
+        correction_m=followed.correction_m,
+        previous_m=_previous_corrections(
+            before,
+            known.current,
+            changed,
+            followed.correction_m.shape,
+            site,
+        ),
+        dt_s=dt_s,
+        settled=followed.settled,
+        judged=watched.ready,
+        elevation_rad=followed.should.elevation_rad,
+    )
+
+
+def _before(epoch: GroundEpoch, followed: _Followed) -> Before:
+    """What the next epoch needs of this one."""
+    return Before(
+        gps_week=epoch.gps_week,
+        tow_s=epoch.tow_s,
+        code_m=followed.raw.code_m[:, L1],
+        smoothed_m=followed.tracks.smoothed_m,
+        correction_m=followed.correction_m,
     )
 
 

@@ -305,6 +305,7 @@ class _Run:
         self._failed = np.zeros(N_SATS, dtype=bool)
 
     def over(self, epochs: Iterable[RecordedEpoch]) -> MonitoredSeries:
+        """What the monitors said at each epoch, in order."""
         rows: list[dict[str, NDArray[np.generic]]] = []
         keys: list[int] = []
         for epoch in epochs:
