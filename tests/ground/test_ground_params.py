@@ -168,7 +168,6 @@ def test_messages_of_a_full_station():
     assert message.adb1.reference_station_data_selector == 3
     assert message.adb3.k_md_e_d_gps == 12.75
     assert message.adb4.slot_group == 0b101
-    assert station.station_message(healthy=False).gcid == GCID_UNHEALTHY
 
 
 def test_reference_point_and_receivers():

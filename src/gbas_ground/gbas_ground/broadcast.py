@@ -17,7 +17,13 @@ from gbas_core.record import FloatArray
 from gbas_core.satellites import RANGING_SOURCE_ID
 from gbas_ground.corrections import BoolArray
 from gbas_ground.monitors.multiple_reference import MAX_B_VALUE_M
-from gbas_ground.params import MIN_SERVICE_SATELLITES, GroundParams
+from gbas_ground.params import (
+    GCID_UNHEALTHY,
+    MAX_DECORRELATION,
+    MAX_SIGMA_VIG,
+    MIN_SERVICE_SATELLITES,
+    GroundParams,
+)
 from gbas_ground.sigma import MAX_SIGMA_M
 from gbas_msgs_py.records import ChannelState, IntegrityEpoch
 from gbas_msgs_py.vdb.burst import FRAME_DURATION_S, Burst
@@ -72,6 +78,8 @@ def broadcastable(integrity: IntegrityEpoch, params: GroundParams) -> BoolArray:
     b = np.where(np.isnan(integrity.b_m), 0.0, np.abs(integrity.b_m)).max(axis=0)
     ok = (integrity.state == ChannelState.USABLE) & _counts(integrity.iod) & _counts(integrity.ephemeris_crc)
     ok = ok & (integrity.ephemeris_crc <= _MAX_CRC)
+    for decorrelation in (integrity.p_ephemeris, integrity.p_ephemeris_d):
+        ok = ok & (decorrelation >= 0.0) & (decorrelation <= MAX_DECORRELATION)
     for prc, rrc in (
         (integrity.prc_100_m, integrity.rrc_100_mps),
         (integrity.prc_30_m, integrity.rrc_30_mps),
@@ -88,11 +96,10 @@ def _counts(values: FloatArray) -> BoolArray:
 
 
 @lru_cache(maxsize=8)
-def _constants(params: GroundParams) -> tuple[Type2, Type2, tuple[FasDataSet, ...], ScheduleParams, int]:
-    """Station data (healthy and not), approaches, schedule settings and how many satellites fit."""
-    healthy, unhealthy = params.station_message(), params.station_message(healthy=False)
-    approaches, schedule = params.approach_messages(), params.schedule()
-    return healthy, unhealthy, approaches, schedule, sources_that_fit(healthy, approaches, schedule)
+def _constants(params: GroundParams) -> tuple[Type2, tuple[FasDataSet, ...], ScheduleParams, int]:
+    """Station data, approaches, schedule settings and how many satellites fit."""
+    station, approaches, schedule = params.station_message(), params.approach_messages(), params.schedule()
+    return station, approaches, schedule, sources_that_fit(station, approaches, schedule)
 
 
 def broadcast_frame(
@@ -111,16 +118,19 @@ def broadcast_frame(
         refused = refused_in_a_row(state.refused, state.refused_key, key)
         if refused < RESTART_AFTER_REFUSED:
             return replace(state, refused=refused, refused_key=key), ()
-    healthy, unhealthy, approaches, schedule, room = _constants(params)
+    station, approaches, schedule, room = _constants(params)
     usable = broadcastable(integrity, params)
-    serves = bool(integrity.n_receivers >= params.min_receivers)
+    sigma_vig = integrity.sigma_vert_iono_gradient
+    serves = bool(integrity.n_receivers >= params.min_receivers and 0.0 <= sigma_vig <= MAX_SIGMA_VIG)
     satellites = _highest(usable, integrity.elevation_rad, room) if serves else ()
     serves = len(satellites) >= MIN_SERVICE_SATELLITES
+    # a station that does not serve says so, and claims the least it can of the ionosphere
+    gcid, sigma_vig = (params.gcid, sigma_vig) if serves else (GCID_UNHEALTHY, MAX_SIGMA_VIG)
     frame = Frame(
         gps_week=integrity.gps_week,
         tow_s=integrity.tow_s,
         sources=_sources(integrity, satellites, params),
-        station=healthy if serves else unhealthy,
+        station=replace(station, gcid=gcid, sigma_vert_iono_gradient=sigma_vig),
         approaches=approaches,
     )
     scheduled, bursts = schedule_frame(state.schedule, frame, schedule)
@@ -141,10 +151,8 @@ def _sources(
 ) -> tuple[SourceCorrection, ...]:
     """All there is to send of the satellites."""
     chosen = list(satellites)
-    columns = [
-        getattr(integrity, name)[chosen].tolist()
-        for name in ("iod", "ephemeris_crc", "prc_100_m", "rrc_100_mps", "sigma_pr_gnd_m")
-    ]
+    names = ("iod", "ephemeris_crc", "prc_100_m", "rrc_100_mps", "sigma_pr_gnd_m", "p_ephemeris", "p_ephemeris_d")
+    columns = [getattr(integrity, name)[chosen].tolist() for name in names]
     b_values = integrity.b_m[:, chosen].T.tolist()
     thirty = _corrections_30(integrity, chosen) if params.gast_d else [None] * len(chosen)
     return tuple(
@@ -159,10 +167,10 @@ def _sources(
             ),
             correction_30=correction_30,
             ephemeris_crc=int(crc),
-            ephemeris_decorrelation=params.p_ephemeris,
-            ephemeris_decorrelation_d=params.p_ephemeris_d,
+            ephemeris_decorrelation=p,
+            ephemeris_decorrelation_d=p_d,
         )
-        for number, iod, crc, prc, rrc, sigma, b, correction_30 in zip(
+        for number, iod, crc, prc, rrc, sigma, p, p_d, b, correction_30 in zip(
             RANGING_SOURCE_ID[chosen].tolist(), *columns, b_values, thirty, strict=True
         )
     )

@@ -97,6 +97,7 @@ def integrity_of(
     measured: Measured,
     made: Corrections,
     condition: Condition,
+    params: GroundParams,
 ) -> IntegrityEpoch:
     """The record of an epoch: a row for every satellite in view, corrections where they are usable."""
     usable = condition.state == ChannelState.USABLE
@@ -116,9 +117,12 @@ def integrity_of(
         gps_week=gps_week,
         tow_s=tow_s,
         n_receivers=float((made.used & usable).any(axis=1).sum()),
+        sigma_vert_iono_gradient=params.sigma_vert_iono_gradient,
         state=of_row(condition.state),
         cause=of_row(condition.cause),
         elevation_rad=of_row(measured.elevation_rad),
+        p_ephemeris=of_usable(np.full(N_SATS, params.p_ephemeris)),
+        p_ephemeris_d=of_usable(np.full(N_SATS, params.p_ephemeris_d)),
         iod=of_row(known.current.iod),
         ephemeris_crc=of_row(known.crc),
         prc_100_m=of_usable(made.prc_m[0]),

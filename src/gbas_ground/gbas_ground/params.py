@@ -41,6 +41,10 @@ _DEGREE: Final = math.pi / 180.0
 ROOT_KEY: Final = "ground"
 GCID_UNHEALTHY: Final = 7
 RSDS_NONE: Final = 255
+MAX_SIGMA_VIG: Final = 25.5e-6
+"""Largest vertical ionosphere gradient sigma that a type 2 message carries [m/m]."""
+MAX_DECORRELATION: Final = 1.275e-3
+"""Largest ephemeris decorrelation parameter that a type 1 or type 11 message carries [m/m]."""
 MIN_SERVICE_SATELLITES: Final = 4
 """Fewer corrections than this give nobody a position: the station then says that it is not healthy."""
 
@@ -114,10 +118,22 @@ class GroundParams(Declared):
 
     # --- atmosphere
     sigma_vert_iono_gradient: float = parameter(
-        "atmosphere", "sigma_vert_iono_gradient", 25.5e-6, "m/m", "for the type 2 message", low=0.0, high=25.5e-6
+        "atmosphere",
+        "sigma_vert_iono_gradient",
+        MAX_SIGMA_VIG,
+        "m/m",
+        "for the type 2 message",
+        low=0.0,
+        high=MAX_SIGMA_VIG,
     )
     sigma_vert_iono_gradient_d: float = parameter(
-        "atmosphere", "sigma_vert_iono_gradient_d", 25.5e-6, "m/m", "for additional data block 3", low=0.0, high=25.5e-6
+        "atmosphere",
+        "sigma_vert_iono_gradient_d",
+        MAX_SIGMA_VIG,
+        "m/m",
+        "for additional data block 3",
+        low=0.0,
+        high=MAX_SIGMA_VIG,
     )
     refractivity: float = parameter("atmosphere", "refractivity", 400.0, "N", "at the site", low=16.0, high=781.0)
     refractivity_uncertainty: float = parameter(
@@ -129,10 +145,22 @@ class GroundParams(Declared):
 
     # --- ephemeris
     p_ephemeris: float = parameter(
-        "ephemeris", "p", 1.275e-3, "m/m", "decorrelation parameter of the type 1 message", low=0.0, high=1.275e-3
+        "ephemeris",
+        "p",
+        MAX_DECORRELATION,
+        "m/m",
+        "decorrelation parameter of the type 1 message",
+        low=0.0,
+        high=MAX_DECORRELATION,
     )
     p_ephemeris_d: float = parameter(
-        "ephemeris", "p_d", 1.275e-3, "m/m", "decorrelation parameter of the type 11 message", low=0.0, high=1.275e-3
+        "ephemeris",
+        "p_d",
+        MAX_DECORRELATION,
+        "m/m",
+        "decorrelation parameter of the type 11 message",
+        low=0.0,
+        high=MAX_DECORRELATION,
     )
     k_md_e_pos: float = parameter("ephemeris", "k_md_e_pos", 12.75, "-", "positioning service", low=0.0, high=12.75)
     k_md_e_c: float = parameter("ephemeris", "k_md_e_c", 12.75, "-", "service type C", low=0.0, high=12.75)
@@ -258,12 +286,12 @@ class GroundParams(Declared):
         """Reference point of the station, ECEF, ``(3,)`` [m]."""
         return ecef_from_geodetic(self.latitude_rad, self.longitude_rad, self.height_m)
 
-    def station_message(self, *, healthy: bool = True) -> Type2:
-        """Station data as broadcast; a station that is not healthy says so whatever its parameters."""
+    def station_message(self) -> Type2:
+        """Station data as declared; the broadcast puts in what an epoch does not support."""
         return Type2(
             n_reference_receivers=self.n_receivers if self.n_receivers >= 2 else None,
             ground_accuracy_designator=self.accuracy_designator,
-            gcid=self.gcid if healthy else GCID_UNHEALTHY,
+            gcid=self.gcid,
             magnetic_variation_rad=self.magnetic_variation_rad,
             sigma_vert_iono_gradient=self.sigma_vert_iono_gradient,
             refractivity_index=self.refractivity,

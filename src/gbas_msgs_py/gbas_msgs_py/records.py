@@ -76,9 +76,12 @@ class IntegrityEpoch(Record):
     """
 
     n_receivers: float = scalar("-", "reference receivers in use")
+    sigma_vert_iono_gradient: float = scalar("m/m", "sigma_vig as broadcast in the type 2 message")
     state: FloatArray = per_satellite("-", "ChannelState")
     cause: FloatArray = per_satellite("-", "ExclusionCause, 0 when none")
     elevation_rad: FloatArray = per_satellite("rad", "elevation at the reference point")
+    p_ephemeris: FloatArray = per_satellite("m/m", "ephemeris decorrelation parameter of the 100 s correction")
+    p_ephemeris_d: FloatArray = per_satellite("m/m", "the same of the 30 s correction")
     iod: FloatArray = per_satellite("-", "issue of data of the ephemeris used")
     ephemeris_crc: FloatArray = per_satellite("-", "16-bit ephemeris CRC")
     prc_100_m: FloatArray = per_satellite("m", "pseudorange correction, 100 s smoothing")
@@ -127,9 +130,7 @@ class MonitorEpoch(Record):
     threshold: FloatArray = per_satellite(
         "*", "threshold of the statistic", columns=tuple(f"{name}_threshold" for name in GROUND_MONITORS)
     )
-    state: FloatArray = per_satellite(
-        "-", "MonitorState", columns=tuple(f"{name}_state" for name in GROUND_MONITORS)
-    )
+    state: FloatArray = per_satellite("-", "MonitorState", columns=tuple(f"{name}_state" for name in GROUND_MONITORS))
     ccd_receiver_mps: FloatArray = per_satellite(
         "m/s", "divergence rate of one receiver, L1", columns=tuple(f"rr{j}_ccd_mps" for j in _RECEIVERS)
     )

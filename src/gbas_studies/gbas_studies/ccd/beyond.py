@@ -203,8 +203,9 @@ def _mode_item(mode: str, runs: Sequence[Detection], rates: Sequence[float]) -> 
     for rate in rates:
         times = [each.times_s["gast-f-sound"] for each in runs if each.d_mps == rate]
         seen = [time for time in times if np.isfinite(time)]
-        parts.append(f"{rate:g}: {min(seen):.1f}–{max(seen):.1f} "
-        f"s" if len(seen) == len(times) else f"{rate:g}: not all")
+        parts.append(
+            f"{rate:g}: {min(seen):.1f}–{max(seen):.1f} s" if len(seen) == len(times) else f"{rate:g}: not all"
+        )
     for each in runs:
         due = each.expected_s["gast-f-sound"]
         if np.isfinite(due) and due < 60.0 and not np.isfinite(each.times_s["gast-f-sound"]):
