@@ -111,6 +111,25 @@ def test_report_holds_everything_and_needs_nothing_else(tmp_path: Path) -> None:
     assert study["sections"][0]["items"][0]["paper"] == pytest.approx(0.1)
 
 
+def test_ticks_say_what_they_are() -> None:
+    """Result values, statements, coefficients and inputs that are met are counted apart; what is not met is no tick."""
+    met = {"paper": "0.2"}
+    items = (
+        value(0.2, **met), value(0.2, **met), value(0.2, **met, kind="coefficient"), value(0.2, **met, kind="input"),
+        value(0.2), value(0.2, paper="0.1", why="no"), claim(True), claim(True, kind="coefficient"),
+        claim(True, new=True),
+    )  # fmt: skip
+    section = Section(title="", items=items)
+    study = Reproduction(study="toy", title="", source="", about="", sections=(section,))
+    assert study.ticks() == {"result value": 2, "statement": 1, "coefficient": 2, "input": 1}
+    assert sum(study.ticks().values()) == study.counts()[Verdict.REPRODUCED]
+    assert study.headline(Verdict.REPRODUCED).endswith("2 result values, 1 statement, 2 coefficients, 1 input")
+    assert study.headline(Verdict.DIFFERS) == Verdict.DIFFERS.words
+    assert study.as_json()["reproduced"] == {"result_values": 2, "statements": 1, "coefficients": 2, "inputs": 1}
+    with pytest.raises(ValueError, match="kind is 'guess'"):
+        value(0.2, kind="guess")
+
+
 def test_report_is_the_same_bits_each_time(tmp_path: Path) -> None:
     first, second = (write_report([example()], tmp_path / name) for name in ("a", "b"))
     assert first.report.read_bytes() == second.report.read_bytes()

@@ -7,13 +7,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal, InvalidOperation
 from enum import Enum
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 _LEAST_DIGITS = 5
+
+Kind = Literal["result", "coefficient", "input"]
+"""What an item is of: what the paper finds, a number inside its equations, or what it starts from."""
 
 
 class Verdict(Enum):
@@ -102,6 +105,8 @@ class Value:
     why : str
         Why the value differs, is a point value, is only close, is not comparable, or was left out. Needed for all of
         these.
+    kind : {"result", "coefficient", "input"}
+        A coefficient or an input that is met says less than a result that is: they are counted apart.
     """
 
     name: str
@@ -113,8 +118,10 @@ class Value:
     tolerance: float | None = None
     comparable: bool = True
     why: str = ""
+    kind: Kind = "result"
 
     def __post_init__(self) -> None:
+        _check_kind(self)
         if self.paper is not None:
             _decimal(self.paper)
         if not self.definition:
@@ -182,6 +189,8 @@ class Claim:
         Needed when the claim does not hold or was left out.
     new : bool
         The statement is ours, not the paper's.
+    kind : {"result", "coefficient", "input"}
+        As of a :class:`Value`.
     """
 
     name: str
@@ -192,8 +201,10 @@ class Claim:
     why: str = ""
     new: bool = False
     unit: str = ""
+    kind: Kind = "result"
 
     def __post_init__(self) -> None:
+        _check_kind(self)
         if not self.definition:
             raise ValueError(f"{self.name}: a claim needs a definition")
         if not self.holds and not self.why:
@@ -228,8 +239,14 @@ def reason(item: Item) -> str:
     return "" if item.verdict is Verdict.REPRODUCED else item.why
 
 
+def _check_kind(item: Item) -> None:
+    if item.kind not in get_args(Kind):
+        raise ValueError(f"{item.name}: kind is {item.kind!r}: must be one of {', '.join(get_args(Kind))}")
+
+
 def _common(item: Item) -> dict[str, Any]:
     return {
+        "of": item.kind,
         "definition": item.definition,
         "verdict": item.verdict.name.lower(),
         "mark": item.verdict.value,
@@ -343,6 +360,21 @@ class Reproduction:
         found = Counter(item.verdict for item in self.items)
         return {verdict: found.get(verdict, 0) for verdict in Verdict}
 
+    def ticks(self) -> dict[str, int]:
+        """What the reproduced items are: result values, statements, coefficients and inputs."""
+        names = {"result": "result value", "coefficient": "coefficient", "input": "input"}
+        found = Counter(
+            "statement" if isinstance(item, Claim) and item.kind == "result" else names[item.kind]
+            for item in self.items
+            if item.verdict is Verdict.REPRODUCED
+        )
+        return {name: found.get(name, 0) for name in ("result value", "statement", "coefficient", "input")}
+
+    def headline(self, verdict: Verdict) -> str:
+        """A verdict in words; of what is reproduced, also what it is."""
+        parts = [f"{count} {name}{'s' * (count != 1)}" for name, count in self.ticks().items() if count]
+        return f"{verdict.words}: {', '.join(parts)}" if verdict is Verdict.REPRODUCED and parts else verdict.words
+
     def as_json(self) -> dict[str, Any]:
         """The study as JSON-able data."""
         return {
@@ -351,5 +383,6 @@ class Reproduction:
             "source": self.source,
             "about": self.about,
             "verdicts": {verdict.name.lower(): count for verdict, count in self.counts().items()},
+            "reproduced": {f"{name.replace(' ', '_')}s": count for name, count in self.ticks().items()},
             "sections": [section.as_json() for section in self.sections],
         }
