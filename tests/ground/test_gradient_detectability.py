@@ -17,6 +17,7 @@ from gbas_core.frames import geodetic_from_ecef, rot_enu_ecef
 from gbas_core.signals import L1, L5, WAVELENGTH_M
 from gbas_ground.gradient_detectability import (
     GRADIENT_RANGE,
+    SHORTEST_M,
     BaselineMonitor,
     blind_intervals,
     coverage_percent,
@@ -110,7 +111,9 @@ def test_one_baseline_by_hand():
 
 
 def test_nothing_is_seen_across_the_runway_or_under_too_much_noise():
-    assert coverage_percent(monitors(0.0), K) == 0.0
+    for no_baseline_m in (0.0, 5e-324, 1e-9, 0.999 * SHORTEST_M):
+        assert coverage_percent(monitors(no_baseline_m, sigma_m=0.0), K) == 0.0
+    assert coverage_percent(monitors(SHORTEST_M, sigma_m=0.0), K) == 100.0
     assert coverage_percent(monitors(500.0, sigma_m=0.5 * float(WAVELENGTH_M[L1]) / K), K) == 0.0
 
 
@@ -159,7 +162,7 @@ def test_bad_arguments_are_named(arguments: dict, text: str):
 SOME = st.lists(
     st.builds(
         BaselineMonitor,
-        length_m=st.floats(0.0, 1000.0),
+        length_m=st.just(0.0) | st.floats(SHORTEST_M, 1000.0),
         sigma_m=st.floats(0.0, 0.015),
         band=st.sampled_from([L1, L5]),
     ),

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from gbas_core.frames import geodetic_from_ecef
+from gbas_core.frames import geodetic_from_ecef, rot_enu_ecef
 from gbas_core.satellites import N_SATS, SAT_INDEX
 from gbas_core.signals import IONO_RATIO, L1, L2, L5, WAVELENGTH_M
 from gbas_ground.geometry import site_of
@@ -20,11 +22,12 @@ from gbas_ground.monitors.double_difference import (
     reference_satellites,
 )
 from gbas_ground.monitors.false_alarm import false_alarm_multiplier
+from gbas_ground.monitors.gradient_estimates import gradient_set
 from gbas_ground.monitors.ionosphere_gradient import (
     IonosphereGradientParams,
     blind_gradients,
     check_ionosphere_gradient,
-    gradient_set,
+    coverage_at,
     gradient_site,
 )
 from gbas_sim.fronts import WedgeFront
@@ -384,7 +387,87 @@ def test_second_band_and_all_fusion():
     assert both.verdict.failed[20]
     ratio = (strict.by_baseline.statistic / strict.by_baseline.threshold)[..., HERE]
     decided = (strict.verdict.statistic / strict.verdict.threshold)[HERE]
-    np.testing.assert_allclose(decided, ratio.min(axis=0).max(axis=0), rtol=1e-12)
+    np.testing.assert_allclose(decided, np.nanmax(ratio.min(axis=0), axis=0), rtol=1e-12)  # NaN: a band not tested
+
+
+@given(
+    receivers=st.lists(st.tuples(st.floats(-800.0, 800.0), st.floats(-800.0, 800.0)), min_size=2, max_size=4),
+    bearing_deg=st.floats(0.0, 180.0),
+    elevation_deg=st.lists(st.floats(5.0, 90.0), min_size=1, max_size=8),
+    reference_deg=st.floats(40.0, 90.0),
+    factor=st.sampled_from([(1.0,), (0.5, 2.0, 1.0, 1.3)]),
+    fuse=st.sampled_from(["any", "all"]),
+)
+def test_a_second_band_never_lowers_coverage(receivers, bearing_deg, elevation_deg, reference_deg, factor, fuse):
+    """Over sites, elevations and receivers: L1 with L5 detects at least what either detects alone."""
+    latitude, longitude, _ = geodetic_from_ecef(BRAUNSCHWEIG_M[0])
+    places = np.column_stack([np.array(receivers), np.zeros(len(receivers))])
+    where = BRAUNSCHWEIG_M[0] + places @ rot_enu_ecef(latitude, longitude)
+    noise = CarrierNoise(receiver_factor=factor[: len(receivers)] if len(factor) > 1 else factor)
+    elevation, found = np.radians(elevation_deg), {}
+    for bands in ((L1,), (L5,), (L1, L5), (L5, L1)):
+        params = IonosphereGradientParams(
+            runway_bearing_rad=(np.radians(bearing_deg), 0.3), bands=bands, noise=noise, fuse=fuse
+        )
+        site = gradient_site(where, BRAUNSCHWEIG_M[0], params)
+        found[bands] = coverage_at(elevation, np.radians(reference_deg), site, params)
+    assert (found[L1, L5] >= np.maximum(found[(L1,)], found[(L5,)])).all()
+    np.testing.assert_array_equal(found[L1, L5], found[L5, L1])
+
+
+def test_bands_under_one_budget_would_lower_it():
+    """Why bands are chosen: tested always together, L5 costs a station of two receivers gradients at 17 degrees."""
+    params = IonosphereGradientParams(runway_bearing_rad=(RUNWAY_RAD,))
+    site = gradient_site(BRAUNSCHWEIG_M[:2], BRAUNSCHWEIG_M[0], params)
+    elevation = np.radians(np.arange(5.0, 40.0, 0.5))
+    sigma = np.hypot(params.noise.sigma_m(elevation, (L1, L5)), params.noise.sigma_m(np.full(70, 1.2), (L1, L5)))
+    sigma *= np.sqrt(2.0)
+    length = abs(float(site.length_m[0, 0]))
+
+    def covered(row, bands, test):
+        monitors = [BaselineMonitor(length_m=length, sigma_m=s, band=b) for s, b in zip(row, bands, strict=True)]
+        return coverage_percent(monitors, site.tests[test].k_ffd + site.k_md)
+
+    together = np.array([covered(row, (L1, L5), 0) for row in sigma.T])
+    alone = np.array([covered(row[:1], (L1,), 1) for row in sigma.T])
+    assert (together < alone - 0.1).any()
+    chosen = 100.0 * coverage_at(elevation, 1.2, site, params)
+    single = IonosphereGradientParams(runway_bearing_rad=(RUNWAY_RAD,), bands=(L1,))
+    l1_only = 100.0 * coverage_at(elevation, 1.2, gradient_site(BRAUNSCHWEIG_M[:2], BRAUNSCHWEIG_M[0], single), single)
+    assert (chosen >= l1_only).all()
+
+
+def test_tests_that_are_run_are_those_that_coverage_is_of():
+    """Thresholds, bands and coverage belong together: a band that is not chosen is not looked at, and k is the one of
+    as many tests as are run."""
+    rng = np.random.default_rng(12)
+    residual, site = made_up(rng, {}, receivers=2)
+    low = np.where(HERE, np.radians(12.0 + 1.2 * np.arange(N_SATS)), np.nan)
+    references = reference_satellites(HERE, low, PARAMS.references)
+    made = double_differences(residual, site.baselines, references, low, PARAMS.noise, PARAMS.bands)
+    result = check_ionosphere_gradient(made, HERE, site, PARAMS)
+    looked = np.isfinite(result.by_baseline.statistic).any(axis=0)
+    assert not (looked & ~result.tested).any()
+    number = result.tested.sum(axis=0)
+    assert set(number[HERE].tolist()) == {1, 2}  # both happen
+    for satellite in np.flatnonzero(looked.any(axis=0)):
+        k = false_alarm_multiplier(PARAMS.p_false_alarm, tests=int(number[satellite]))
+        limit = k * made.sigma_m[0, :, satellite]
+        np.testing.assert_allclose(result.by_baseline.threshold[0, :, satellite], limit, rtol=1e-12)
+        own = IonosphereGradientParams(
+            runway_bearing_rad=(RUNWAY_RAD,),
+            bands=tuple(np.array(PARAMS.bands)[result.tested[:, satellite]].tolist()),
+        )
+        monitors = [
+            BaselineMonitor(length_m=abs(float(site.length_m[0, 0])), sigma_m=float(sigma), band=band)
+            for sigma, band in zip(
+                made.nominal_sigma_m[0, result.tested[:, satellite], satellite], own.bands, strict=True
+            )
+            if k * sigma < 0.5 * WAVELENGTH_M[band]
+        ]
+        exact = coverage_percent(monitors, k + site.k_md) / 100.0
+        assert result.coverage[satellite] <= exact + 1e-12  # sigmas are rounded up by at most 5 %
+        assert result.coverage[satellite] > exact - 0.1
 
 
 def test_gradient_set_of_one_baseline_is_every_multiple():

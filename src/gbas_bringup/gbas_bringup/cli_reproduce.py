@@ -109,4 +109,4 @@ def _print_tables(reproductions: Iterable[Reproduction]) -> None:
 def verdict_lines(reproduction: Reproduction) -> Sequence[str]:
     """How often there is each verdict, for people; and how many of the ticks are results."""
     counts: dict[Verdict, int] = reproduction.counts()
-    return [f"{verdict.value} {count:3d}  {reproduction.headline(verdict)}" for verdict, count in counts.items() if count]
+    return [f"{each.value} {count:3d}  {reproduction.headline(each)}" for each, count in counts.items() if count]

@@ -41,6 +41,9 @@ Fuse = Literal["any", "all"]
 GRADIENT_RANGE: Final = (300.0e-6, 2000.0e-6)
 """Gradients to be detected for GAST-D [m/m]. Source: the paper, after ICAO Annex 10."""
 
+SHORTEST_M: Final = 1.0e-3
+"""Baselines that are shorter along the runway are none: antennas are surveyed no better [m]. Ours."""
+
 P_FALSE_ALARM: Final = 1.0e-4
 """Fault-free detection, two-sided. Uncertain: the paper does not print it; it reproduces the paper's results."""
 P_MISSED_DETECTION: Final = 1.0e-4
@@ -57,7 +60,7 @@ class BaselineMonitor:
     Attributes
     ----------
     length_m : float
-        Length along the runway (projected, :func:`projected_length_m`) [m].
+        Length along the runway (projected, :func:`projected_length_m`); below `SHORTEST_M` it sees nothing [m].
     sigma_m : float
         Standard deviation that overbounds the double-difference carrier [m].
     band : int
@@ -261,11 +264,10 @@ def _tents(monitor: BaselineMonitor, k: float, gradient_range: tuple[float, floa
     """Detectable intervals of one monitor, within the range."""
     margin, wavelength, slope = k * monitor.sigma_m, monitor.wavelength_m, monitor.slope_m
     low, high = gradient_range
-    if slope == 0.0 or 2.0 * margin >= wavelength:
+    if monitor.length_m < SHORTEST_M or 2.0 * margin >= wavelength:
         return np.empty((0, 2))
     multiple = np.arange(math.floor(low * slope / wavelength), math.floor(high * slope / wavelength) + 1.0) * wavelength
-    with np.errstate(over="ignore"):  # the first tent of a baseline of next to nothing ends far outside the range
-        ends = np.stack([multiple + margin, multiple + (wavelength - margin)], axis=-1) / slope
+    ends = np.stack([multiple + margin, multiple + (wavelength - margin)], axis=-1) / slope
     clipped: FloatArray = np.clip(ends, low, high)
     return clipped[clipped[:, 0] < clipped[:, 1]]
 

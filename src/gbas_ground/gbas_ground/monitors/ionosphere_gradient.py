@@ -10,6 +10,11 @@ What it does not see: a gradient that all satellites share, which is part of the
 a gradient across all baselines; and, at low elevations, whatever a threshold of half a wavelength would have to pass.
 Such satellites are reported as not monitored.
 
+Every test takes a share of the budget of false alarms, so that a second band raises the thresholds of the first, and
+may cost more gradients than it adds. A satellite is therefore tested on the bands, one alone or all together, that
+detect most, each with the thresholds of its own number of tests: more bands never lower the coverage. The choice rests
+on elevations and on which channels there are, not on what was measured, so the budget holds.
+
 Source: Belabbas et al., A GBAS Testbed to Support New Monitoring Algorithms Development for CAT III Precision Approach;
 Khanafseh, Yang, Pervan, ION GNSS 2010.
 
@@ -26,10 +31,10 @@ from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
-from scipy.stats import chi2, norm
+from scipy.stats import norm
 
 from gbas_core.record import FloatArray
-from gbas_core.signals import IONO_RATIO, L1, L5, WAVELENGTH_M
+from gbas_core.signals import L1, L5, WAVELENGTH_M
 from gbas_ground.corrections import BoolArray
 from gbas_ground.gradient_detectability import (
     GRADIENT_RANGE,
@@ -41,8 +46,16 @@ from gbas_ground.gradient_detectability import (
     projected_length_m,
 )
 from gbas_ground.monitors.carrier_noise import CarrierNoise
-from gbas_ground.monitors.double_difference import Baselines, DoubleDifferences, Pairing, baselines_of, decided
+from gbas_ground.monitors.double_difference import (
+    Baselines,
+    DoubleDifferences,
+    IntArray,
+    Pairing,
+    baselines_of,
+    decided,
+)
 from gbas_ground.monitors.false_alarm import FALSE_EXCLUSION, false_alarm_multiplier
+from gbas_ground.monitors.gradient_estimates import gradient_set
 from gbas_ground.monitors.result import MonitorResult, upper_limit
 
 _LEVEL: Final = 1.05  # sigmas are rounded up by at most this factor when the coverage is looked up
@@ -107,6 +120,22 @@ class IonosphereGradientParams:
         check_gradient_range(self.gradient_range)
 
 
+@dataclass(frozen=True, kw_only=True)
+class BandTests:
+    """Bands a satellite may be tested on together.
+
+    Attributes
+    ----------
+    places : tuple of int
+        On the axis of the monitor's bands.
+    k_ffd : float
+        Multiplier of the thresholds when these bands share the budget of false alarms.
+    """
+
+    places: tuple[int, ...]
+    k_ffd: float
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class GradientSite:
     """What the monitor knows of a station; made once, by :func:`gradient_site`.
@@ -116,15 +145,22 @@ class GradientSite:
     baselines : Baselines
     length_m : (W, B) array
         Signed lengths of the baselines along each runway [m].
-    k_ffd, k_md : float
-        Multipliers of the threshold and of missed detection.
+    tests : tuple of BandTests
+        What a satellite may be tested on: all bands, then each alone.
+    k_md : float
+        Multiplier of missed detection.
     """
 
     baselines: Baselines
     length_m: FloatArray
-    k_ffd: float
+    tests: tuple[BandTests, ...]
     k_md: float
-    _known: dict[tuple[int, ...], float] = field(default_factory=dict, repr=False)  # coverages computed so far
+    _known: dict[tuple[float, ...], float] = field(default_factory=dict, repr=False)  # coverages computed so far
+
+    @property
+    def k_ffd(self) -> float:
+        """Multiplier of the thresholds when all bands are tested: the largest."""
+        return self.tests[0].k_ffd
 
 
 def gradient_site(positions_m: FloatArray, reference_m: FloatArray, params: IonosphereGradientParams) -> GradientSite:
@@ -140,11 +176,16 @@ def gradient_site(positions_m: FloatArray, reference_m: FloatArray, params: Iono
     """
     baselines = baselines_of(positions_m, reference_m, params.pairing)
     params.noise.factors(len(positions_m))
-    tests = max(1, len(baselines)) * len(params.bands)
+    places = tuple(range(len(params.bands)))
+    sets = (places, *((place,) for place in places if len(places) > 1))
+    each = max(1, len(baselines))
     return GradientSite(
         baselines=baselines,
         length_m=np.array([projected_length_m(baselines.vector_m, each) for each in params.runway_bearing_rad]),
-        k_ffd=false_alarm_multiplier(params.p_false_alarm, tests=tests),
+        tests=tuple(
+            BandTests(places=own, k_ffd=false_alarm_multiplier(params.p_false_alarm, tests=each * len(own)))
+            for own in sets
+        ),
         k_md=float(norm.isf(params.p_missed_detection)),
     )
 
@@ -162,16 +203,20 @@ class GradientResult:
     monitored : (N,) bool array
         Satellites with a statistic that can detect something, and enough of `params.gradient_range`.
     coverage : (N,) array
-        Share of the range that the satellite's baselines detect now, along the worst runway.
+        Share of the range that the tests that were run detect now, along the worst runway.
+    tested : (F, N) bool array
+        Bands each satellite is tested on.
     gradient : (N,) array
         Of satellites that exceeded a threshold: the smallest gradient along the first runway that explains all their
-        double differences [m/m]; NaN if none does. The others that do: :func:`gradient_set`.
+        double differences [m/m]; NaN if none does. The others that do:
+        :func:`~gbas_ground.monitors.gradient_estimates.gradient_set`.
     """
 
     verdict: MonitorResult
     by_baseline: MonitorResult
     monitored: BoolArray
     coverage: FloatArray
+    tested: BoolArray
     gradient: FloatArray
 
 
@@ -194,14 +239,12 @@ def check_ionosphere_gradient(
     GradientResult
         Satellites are what fails: a double difference does not tell a gradient from a fault of one channel.
     """
-    wavelength = WAVELENGTH_M[list(params.bands)][:, np.newaxis]
-    threshold = site.k_ffd * differences.sigma_m
-    there, half = np.isfinite(differences.residual_m), 0.5 * wavelength
-    looked = there & (threshold < half)
+    there = np.isfinite(differences.residual_m)
+    chosen, coverage = _choice(differences.nominal_sigma_m, there, site, params)
+    tested = _band_masks(site, params)[chosen].T
+    threshold = np.array([each.k_ffd for each in site.tests])[chosen] * differences.sigma_m
+    looked = there & tested & (threshold < _half_wavelength_m(params))
     by_baseline = upper_limit(np.where(looked, np.abs(differences.residual_m), np.nan), threshold, looked)
-    # without noise, so that what is covered does not change with it
-    able = there & (site.k_ffd * differences.nominal_sigma_m < half)
-    coverage = _coverage(differences.nominal_sigma_m, able, site, params)
     statistic, limit = decided(by_baseline.statistic, threshold, params.fuse)
     monitored = (coverage > 0.0) & (coverage >= params.min_coverage) & np.isfinite(statistic)
     exceeded = due & (statistic > limit)
@@ -211,30 +254,89 @@ def check_ionosphere_gradient(
         by_baseline=by_baseline,
         monitored=monitored,
         coverage=coverage,
+        tested=tested,
         gradient=_smallest_gradients(exceeded, differences, looked, site.length_m[0], params.bands),
     )
 
 
-def _coverage(
-    sigma_m: FloatArray, looked: BoolArray, site: GradientSite, params: IonosphereGradientParams
+def coverage_at(
+    elevation_rad: FloatArray, reference_rad: FloatArray | float, site: GradientSite, params: IonosphereGradientParams
 ) -> FloatArray:
-    """Share of the gradients that are detectable, (N,).
+    """Share of `params.gradient_range` detected on satellites of these elevations, ``(N,)``, along the worst runway.
+
+    Parameters
+    ----------
+    elevation_rad : (N,) array
+        Of satellites with all bands at all receivers; for fewer bands, other `params` and `site`.
+    reference_rad : float or (N,) array
+        Elevation of the reference satellite that gives the middle statistic, see :class:`DoubleDifferences`.
+    site : GradientSite
+    params : IonosphereGradientParams
+    """
+    own, reference = (
+        params.noise.sigma_m(np.broadcast_to(each, np.shape(elevation_rad)), params.bands)
+        for each in (elevation_rad, reference_rad)
+    )
+    sigma = _scales(site, params)[:, np.newaxis, np.newaxis] * np.hypot(own, reference)
+    return _choice(sigma, np.isfinite(sigma), site, params)[1]
+
+
+def _band_masks(site: GradientSite, params: IonosphereGradientParams) -> BoolArray:
+    """Bands of each of the site's tests, ``(T, F)``."""
+    return np.array([[place in each.places for place in range(len(params.bands))] for each in site.tests])
+
+
+def _half_wavelength_m(params: IonosphereGradientParams) -> FloatArray:
+    """A threshold beyond this can never be exceeded, ``(F, 1)`` [m]."""
+    return np.asarray(0.5 * WAVELENGTH_M[list(params.bands)][:, np.newaxis])
+
+
+def _choice(
+    nominal_sigma_m: FloatArray, there: BoolArray, site: GradientSite, params: IonosphereGradientParams
+) -> tuple[IntArray, FloatArray]:
+    """Place in the site's tests that detects most, and its coverage, both (N,); the first of equals.
+
+    From sigmas without noise, so that what is tested and covered does not change with what is measured.
+    """
+    half, masks = _half_wavelength_m(params), _band_masks(site, params)
+    coverage = np.array(
+        [
+            _coverage(
+                nominal_sigma_m,
+                there & mask[:, np.newaxis] & (each.k_ffd * nominal_sigma_m < half),
+                each.k_ffd + site.k_md,
+                site,
+                params,
+            )
+            for each, mask in zip(site.tests, masks, strict=True)
+        ]
+    )
+    chosen = coverage.argmax(axis=0)
+    return chosen, coverage.max(axis=0)
+
+
+def _coverage(
+    sigma_m: FloatArray, able: BoolArray, k: float, site: GradientSite, params: IonosphereGradientParams
+) -> FloatArray:
+    """Share of the gradients that the baselines and bands given detect, (N,).
 
     Sigmas of a band are taken as its worst baseline's, relative to the receivers' noise, rounded up: few values that
     come again and again, so that most are known.
     """
     scale = _scales(site, params)
-    level = np.where(looked, sigma_m, 0.0) / scale[:, np.newaxis, np.newaxis]
+    level = np.where(able, sigma_m, 0.0) / scale[:, np.newaxis, np.newaxis]
     largest = level.max(axis=0, initial=0.0)  # (F, N)
     rounded = np.ceil(np.log(np.where(largest > 0.0, largest, 1.0)) / np.log(_LEVEL)).astype(np.int64)
-    size = looked.shape[0] * looked.shape[1]
-    code = (np.int64(1) << np.arange(size, dtype=np.int64)) @ looked.reshape(size, looked.shape[-1])
+    size = able.shape[0] * able.shape[1]
+    code = (np.int64(1) << np.arange(size, dtype=np.int64)) @ able.reshape(size, able.shape[-1])
     result = np.zeros(code.shape)
     satellites = np.flatnonzero(code)
     keys = zip(code[satellites].tolist(), *rounded[:, satellites].tolist(), strict=True)
-    for satellite, key in zip(satellites, keys, strict=True):
+    for satellite, levels in zip(satellites, keys, strict=True):
+        key = (k, *levels)
         if key not in site._known:
-            site._known[key] = _coverage_of(key[0], np.outer(scale, _LEVEL ** np.array(key[1:])), site, params)
+            sigmas = np.outer(scale, _LEVEL ** np.array(levels[1:]))
+            site._known[key] = _coverage_of(levels[0], sigmas, k, site, params)
         result[satellite] = site._known[key]
     return result
 
@@ -260,10 +362,12 @@ def _monitors(
     ]
 
 
-def _coverage_of(looked: int, sigma_m: FloatArray, site: GradientSite, params: IonosphereGradientParams) -> float:
+def _coverage_of(
+    able: int, sigma_m: FloatArray, k: float, site: GradientSite, params: IonosphereGradientParams
+) -> float:
     shares = []
     for length in site.length_m:
-        blind = _blind(_monitors(looked, sigma_m, length, params), site.k_ffd + site.k_md, params)
+        blind = _blind(_monitors(able, sigma_m, length, params), k, params)
         low, high = params.gradient_range
         shares.append(1.0 - float((blind[:, 1] - blind[:, 0]).sum()) / (high - low))
     return min(shares)
@@ -308,11 +412,14 @@ def blind_gradients(
     runway : int
         Place in `params.runway_bearing_rad`.
     """
-    sigma = differences.nominal_sigma_m[..., satellite]
-    wavelength = WAVELENGTH_M[list(params.bands)]
-    looked = np.isfinite(differences.residual_m[..., satellite]) & (site.k_ffd * sigma < 0.5 * wavelength)
-    code = sum(1 << place for place in np.flatnonzero(looked.ravel()).tolist())
-    return _blind(_monitors(code, sigma, site.length_m[runway], params), site.k_ffd + site.k_md, params)
+    sigma = differences.nominal_sigma_m[..., [satellite]]
+    there = np.isfinite(differences.residual_m[..., [satellite]])
+    (place,), _ = _choice(sigma, there, site, params)
+    k_ffd = site.tests[place].k_ffd
+    mask = _band_masks(site, params)[place][:, np.newaxis]
+    able = there & mask & (k_ffd * sigma < _half_wavelength_m(params))
+    code = sum(1 << place for place in np.flatnonzero(able.ravel()).tolist())
+    return _blind(_monitors(code, sigma[..., 0], site.length_m[runway], params), k_ffd + site.k_md, params)
 
 
 def _smallest_gradients(
@@ -326,53 +433,3 @@ def _smallest_gradients(
         if explained.size:
             result[satellite] = explained[0]
     return result
-
-
-def gradient_set(
-    residual_m: FloatArray,
-    sigma_m: FloatArray,
-    length_m: FloatArray,
-    bands: tuple[int, ...],
-    *,
-    largest: float = GRADIENT_RANGE[1],
-    p_lost: float = 1.0e-4,
-) -> FloatArray:
-    """All gradients along the runway that explain the double differences of one satellite, n lambda and all.
-
-    Parameters
-    ----------
-    residual_m, sigma_m : (B, F) arrays
-        Double differences and their sigmas [m]; NaN where there is none.
-    length_m : (B,) array
-        Signed lengths along the runway [m].
-    bands : tuple of int
-        The F bands.
-    largest : float
-        Largest size looked for [m/m].
-    p_lost : float
-        Probability that the true gradient is not in the set.
-
-    Returns
-    -------
-    (n,) array
-        In order of size [m/m]: of one baseline, every ``(-dd + n lambda) / slope``; of several, those on which they
-        agree (chi-square of the residuals). Empty if no gradient along the runway explains them.
-
-    Source: the paper, eq (2), (3).
-    """
-    slope = length_m[:, np.newaxis] * IONO_RATIO[list(bands)]
-    there = np.isfinite(residual_m + sigma_m) & (slope != 0.0)
-    if not there.any():
-        return np.empty(0)
-    delay, sigma, slope = -residual_m[there], sigma_m[there], slope[there]
-    wavelength = np.broadcast_to(WAVELENGTH_M[list(bands)], there.shape)[there]
-    first = int(np.argmax(np.abs(slope) / wavelength))  # its multiples are the closest
-    most = int(np.ceil((largest * abs(slope[first]) + wavelength[first]) / wavelength[first]))
-    start = (delay[first] + np.arange(-most, most + 1) * wavelength[first]) / slope[first]
-    whole = np.rint((start[:, np.newaxis] * slope - delay) / wavelength) * wavelength + delay
-    weight = slope / sigma**2
-    gradient = whole @ weight / (slope @ weight)
-    misfit = (((whole - gradient[:, np.newaxis] * slope) / sigma) ** 2).sum(axis=-1)
-    agrees = misfit <= chi2.isf(p_lost, max(1, delay.size - 1))
-    kept = gradient[agrees & (np.abs(gradient) <= largest)]
-    return np.asarray(kept[np.argsort(np.abs(kept), kind="stable")])
