@@ -11,7 +11,12 @@ from gbas_core.frames import geodetic_from_ecef, rot_enu_ecef
 from gbas_core.satellites import N_SATS, SAT_INDEX
 from gbas_core.signals import IONO_RATIO, L1, L2, L5, WAVELENGTH_M
 from gbas_ground.geometry import site_of
-from gbas_ground.gradient_detectability import BaselineMonitor, blind_intervals, coverage_percent
+from gbas_ground.gradient_detectability import (
+    BaselineMonitor,
+    blind_intervals,
+    coverage_percent,
+    double_difference_sigma_m,
+)
 from gbas_ground.monitors.carrier_noise import CarrierNoise
 from gbas_ground.monitors.double_difference import (
     NO_REFERENCE,
@@ -30,6 +35,7 @@ from gbas_ground.monitors.ionosphere_gradient import (
     coverage_at,
     gradient_site,
 )
+from gbas_ground.params import GroundParams
 from gbas_sim.fronts import WedgeFront
 from gbas_sim.presets import receiver_preset
 from gbas_sim.troposphere import Troposphere as SimulatedTroposphere
@@ -388,6 +394,34 @@ def test_second_band_and_all_fusion():
     ratio = (strict.by_baseline.statistic / strict.by_baseline.threshold)[..., HERE]
     decided = (strict.verdict.statistic / strict.verdict.threshold)[HERE]
     np.testing.assert_allclose(decided, np.nanmax(ratio.min(axis=0), axis=0), rtol=1e-12)  # NaN: a band not tested
+
+
+def test_noise_ratio_of_a_station_file():
+    """The paper's eq (1), sqrt(2 (1 + r^2)) sigma_i, from the file's factors; what is detected follows them."""
+    sections = {
+        "station": {"id": "EDVE", "latitude_deg": 52.32, "longitude_deg": 10.55, "height_m": 130.0},
+        "receivers": {f"rr{number + 1}_ecef_m": place.tolist() for number, place in enumerate(BRAUNSCHWEIG_M)},
+        "gradient": {"runway_bearing_deg": [84.73]},
+    }
+    high = np.full(N_SATS, np.radians(60.0))
+    coverage = {}
+    for factors in ((1.0,), (2.0, 0.5, 1.0, 4.0), (4.0,)):
+        station = GroundParams.from_mapping(sections | {"carrier_noise": {"receiver_factor": list(factors)}})
+        noise = station.monitors.carrier_noise.params()
+        params = station.monitors.gradient.params((), noise)
+        site = gradient_site(station.receiver_positions_m(), station.reference_point_m(), params)
+        coverage[factors] = float(coverage_at(high[:1], high[:1], site, params)[0])
+        made = double_differences(
+            np.zeros((4, 2, N_SATS)), site.baselines, reference_satellites(HERE, high, 1), high, noise, params.bands
+        )
+        each = noise.factors(4)
+        for row, (i, j) in enumerate(zip(site.baselines.first, site.baselines.second, strict=True)):
+            sigma_i = each[i] * float(noise.sigma_m(high, (L1,))[0, 0])
+            expected = double_difference_sigma_m(sigma_i, each[j] / each[i])
+            assert made.sigma_m[row, 0, 20] == pytest.approx(float(expected), rel=1e-12)
+        acceleration = station.monitors.acceleration.params(1.0, station.monitors.carrier_noise.receiver_factor)
+        np.testing.assert_array_equal(acceleration.noise.factors(4), each)
+    assert coverage[(1.0,)] > coverage[(2.0, 0.5, 1.0, 4.0)] > coverage[(4.0,)]
 
 
 @given(

@@ -171,9 +171,10 @@ class AccelerationSection(Declared):
                 f"acceleration.least_points = {self.least_points} is more than acceleration.points = {self.points}"
             )
 
-    def params(self, max_gap_s: float) -> CarrierAccelerationParams:
-        """Parameters of the monitor."""
+    def params(self, max_gap_s: float, receiver_factor: tuple[float, ...] = (1.0,)) -> CarrierAccelerationParams:
+        """Parameters of the monitor; its noise within seconds is its own, how receivers compare is the station's."""
         return CarrierAccelerationParams(
+            noise=replace(CarrierAccelerationParams.noise, receiver_factor=receiver_factor),
             points=self.points,
             window_s=self.window_s,
             least_points=self.least_points,
@@ -317,15 +318,29 @@ class CarrierNoiseSection(Declared):
         per_unit=_DEGREE,
     )
 
+    receiver_factor: tuple[float, ...] = parameter(
+        "carrier_noise",
+        "receiver_factor",
+        CarrierNoise.receiver_factor,
+        "-",
+        "on the sigma of rr1, rr2, ..., or one for all; r_ij is the ratio of two of them",
+        low=0.1,
+        high=10.0,
+    )
+
     def params(self) -> CarrierNoise:
         """Parameters of the model."""
-        return CarrierNoise(floor_m=self.floor_m, low_m=self.low_m, scale_rad=self.scale_rad)
+        return CarrierNoise(
+            floor_m=self.floor_m, low_m=self.low_m, scale_rad=self.scale_rad, receiver_factor=self.receiver_factor
+        )
 
     def __post_init__(self) -> None:
         super().__post_init__()
         for name in ("floor_m", "low_m"):
             if len(getattr(self, name)) != len(BANDS):
                 raise ParameterError(f"carrier_noise.{name} = {getattr(self, name)} is not {len(BANDS)} numbers")
+        if not self.receiver_factor:
+            raise ParameterError("carrier_noise.receiver_factor = () is not one number for all receivers, or one each")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -463,6 +463,12 @@ def _check_receivers(params: GroundParams) -> None:
         raise ParameterError(
             f"receivers.minimum = {params.min_receivers} is more than the {len(positions)} receivers there are"
         )
+    factors = params.monitors.carrier_noise.receiver_factor
+    if len(factors) not in (1, len(positions)):
+        raise ParameterError(
+            f"carrier_noise.receiver_factor = {factors} is neither one number nor one for each of the "
+            f"{len(positions)} receivers"
+        )
 
 
 def _check_sigma_table(params: GroundParams) -> None:

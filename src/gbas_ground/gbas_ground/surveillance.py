@@ -211,7 +211,7 @@ def _settings(params: GroundParams) -> _Settings:
     return _Settings(
         ccd=ccd,
         ccd_f=sections.ccd_f.params(ccd.filters, params.refractivity * 1e-6 * params.scale_height_m),
-        acceleration=sections.acceleration.params(params.max_gap_s),
+        acceleration=sections.acceleration.params(params.max_gap_s, sections.carrier_noise.receiver_factor),
         gradient=gradient,
         gradient_required=sections.gradient.required or params.gast_d,
         ephemeris=sections.ephemeris.params(gradient.bands),

@@ -19,7 +19,7 @@ from scipy.stats import chi2
 
 from gbas_core.record import FloatArray
 from gbas_core.signals import IONO_RATIO, WAVELENGTH_M
-from gbas_ground.gradient_detectability import GRADIENT_RANGE
+from gbas_ground.gradient_detectability import GRADIENT_RANGE, wrap_m
 
 LEAST_ANGLE_RAD: Final = float(np.radians(5.0))
 """Directions of baselines that differ by less tell no direction of a gradient. Ours."""
@@ -169,7 +169,7 @@ def gradient_vectors(
     start = start[np.hypot(*start.T) <= 1.1 * largest]  # the fit moves them a little
     unwrapped = delay + wavelength * np.rint((start @ design.T - delay) / wavelength)
     weight = np.linalg.inv(covariance)
-    own = np.linalg.inv(design.T @ weight @ design)
+    own = np.asarray(np.linalg.inv(design.T @ weight @ design), dtype=np.float64)
     vector = unwrapped @ weight @ design @ own
     left = unwrapped - vector @ design.T
     misfit = np.einsum("ni,ij,nj->n", left, weight, left)
@@ -190,7 +190,7 @@ def _observed(
         if there.size < 2:
             continue
         first, others = there[0], there[1:]
-        delay.append(difference_m[first, place] - difference_m[others, place])
+        delay.append(wrap_m(difference_m[first, place] - difference_m[others, place], float(WAVELENGTH_M[band])))
         design.append(float(IONO_RATIO[band]) * (place_m[others, :2] - place_m[first, :2]))
         blocks.append(sigma_m[place] ** 2 * (np.diag(factor[others] ** 2) + factor[first] ** 2))
         wavelength.append(np.full(others.size, float(WAVELENGTH_M[band])))

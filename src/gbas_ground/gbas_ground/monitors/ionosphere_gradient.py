@@ -59,6 +59,7 @@ from gbas_ground.monitors.gradient_estimates import gradient_set
 from gbas_ground.monitors.result import MonitorResult, upper_limit
 
 _LEVEL: Final = 1.05  # sigmas are rounded up by at most this factor when the coverage is looked up
+_PER_STEP: Final = float(1.0 / np.log(_LEVEL))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -155,7 +156,8 @@ class GradientSite:
     length_m: FloatArray
     tests: tuple[BandTests, ...]
     k_md: float
-    _known: dict[tuple[float, ...], float] = field(default_factory=dict, repr=False)  # coverages computed so far
+    # choices and coverages computed so far
+    _known: dict[tuple[int, ...], tuple[int, float]] = field(default_factory=dict, repr=False)
 
     @property
     def k_ffd(self) -> float:
@@ -296,49 +298,46 @@ def _choice(
 ) -> tuple[IntArray, FloatArray]:
     """Place in the site's tests that detects most, and its coverage, both (N,); the first of equals.
 
-    From sigmas without noise, so that what is tested and covered does not change with what is measured.
+    From sigmas without noise, so that what is tested and covered does not change with what is measured. Sigmas of a
+    band are taken as its worst baseline's, relative to the receivers' noise, rounded up: few values that come again and
+    again, so that most are known.
     """
-    half, masks = _half_wavelength_m(params), _band_masks(site, params)
-    coverage = np.array(
-        [
-            _coverage(
-                nominal_sigma_m,
-                there & mask[:, np.newaxis] & (each.k_ffd * nominal_sigma_m < half),
-                each.k_ffd + site.k_md,
-                site,
-                params,
-            )
-            for each, mask in zip(site.tests, masks, strict=True)
-        ]
-    )
-    chosen = coverage.argmax(axis=0)
-    return chosen, coverage.max(axis=0)
-
-
-def _coverage(
-    sigma_m: FloatArray, able: BoolArray, k: float, site: GradientSite, params: IonosphereGradientParams
-) -> FloatArray:
-    """Share of the gradients that the baselines and bands given detect, (N,).
-
-    Sigmas of a band are taken as its worst baseline's, relative to the receivers' noise, rounded up: few values that
-    come again and again, so that most are known.
-    """
-    scale = _scales(site, params)
-    level = np.where(able, sigma_m, 0.0) / scale[:, np.newaxis, np.newaxis]
+    scale, size = _scales(site, params), there.shape[0] * there.shape[1]
+    level = np.where(there, nominal_sigma_m, 0.0) / scale[:, np.newaxis, np.newaxis]
     largest = level.max(axis=0, initial=0.0)  # (F, N)
-    rounded = np.ceil(np.log(np.where(largest > 0.0, largest, 1.0)) / np.log(_LEVEL)).astype(np.int64)
-    size = able.shape[0] * able.shape[1]
-    code = (np.int64(1) << np.arange(size, dtype=np.int64)) @ able.reshape(size, able.shape[-1])
-    result = np.zeros(code.shape)
+    steps = np.ceil(np.log(np.where(largest > 0.0, largest, 1.0)) * _PER_STEP).astype(np.int64)
+    code = (np.int64(1) << np.arange(size, dtype=np.int64)) @ there.reshape(size, there.shape[-1])
+    chosen, coverage = np.zeros(code.shape, dtype=np.int64), np.zeros(code.shape)
     satellites = np.flatnonzero(code)
-    keys = zip(code[satellites].tolist(), *rounded[:, satellites].tolist(), strict=True)
-    for satellite, levels in zip(satellites, keys, strict=True):
-        key = (k, *levels)
+    keys = zip(code[satellites].tolist(), *steps[:, satellites].tolist(), strict=True)
+    for satellite, key in zip(satellites.tolist(), keys, strict=True):
         if key not in site._known:
-            sigmas = np.outer(scale, _LEVEL ** np.array(levels[1:]))
-            site._known[key] = _coverage_of(levels[0], sigmas, k, site, params)
-        result[satellite] = site._known[key]
-    return result
+            site._known[key] = _best(key[0], np.outer(scale, _LEVEL ** np.array(key[1:])), site, params)
+        chosen[satellite], coverage[satellite] = site._known[key]
+    return chosen, coverage
+
+
+def _best(there: int, sigma_m: FloatArray, site: GradientSite, params: IonosphereGradientParams) -> tuple[int, float]:
+    """Place in the site's tests that detects most, and its coverage."""
+    coverage = [
+        min(_covered(there, sigma_m, tests, length, site, params) for length in site.length_m) for tests in site.tests
+    ]
+    place = int(np.argmax(coverage))
+    return place, coverage[place]
+
+
+def _covered(
+    there: int,
+    sigma_m: FloatArray,
+    tests: BandTests,
+    length_m: FloatArray,
+    site: GradientSite,
+    params: IonosphereGradientParams,
+) -> float:
+    """Share of the gradients that is not blind."""
+    blind = _blind(there, sigma_m, tests, length_m, site, params)
+    low, high = params.gradient_range
+    return 1.0 - float((blind[:, 1] - blind[:, 0]).sum()) / (high - low)
 
 
 def _scales(site: GradientSite, params: IonosphereGradientParams) -> FloatArray:
@@ -347,37 +346,25 @@ def _scales(site: GradientSite, params: IonosphereGradientParams) -> FloatArray:
     return np.asarray(np.hypot(factors[site.baselines.first], factors[site.baselines.second]))
 
 
-def _monitors(
-    looked: int, sigma_m: FloatArray, length_m: FloatArray, params: IonosphereGradientParams
-) -> list[list[BaselineMonitor]]:
-    """The baselines behind a satellite, band by band."""
-    n_bands = len(params.bands)
-    return [
-        [
+def _blind(
+    there: int,
+    sigma_m: FloatArray,
+    tests: BandTests,
+    length_m: FloatArray,
+    site: GradientSite,
+    params: IonosphereGradientParams,
+) -> FloatArray:
+    """Gradients that are blind on each of the bands that are tested; `there` has a bit a baseline and band."""
+    blind, n_bands = np.array([params.gradient_range]), len(params.bands)
+    for place in tests.places:
+        band = params.bands[place]
+        monitors = [
             BaselineMonitor(length_m=abs(float(length_m[row])), sigma_m=float(sigma_m[row, place]), band=band)
             for row in range(len(length_m))
-            if looked >> (row * n_bands + place) & 1
+            if there >> (row * n_bands + place) & 1 and tests.k_ffd * sigma_m[row, place] < 0.5 * WAVELENGTH_M[band]
         ]
-        for place, band in enumerate(params.bands)
-    ]
-
-
-def _coverage_of(
-    able: int, sigma_m: FloatArray, k: float, site: GradientSite, params: IonosphereGradientParams
-) -> float:
-    shares = []
-    for length in site.length_m:
-        blind = _blind(_monitors(able, sigma_m, length, params), k, params)
-        low, high = params.gradient_range
-        shares.append(1.0 - float((blind[:, 1] - blind[:, 0]).sum()) / (high - low))
-    return min(shares)
-
-
-def _blind(by_band: list[list[BaselineMonitor]], k: float, params: IonosphereGradientParams) -> FloatArray:
-    """Blind gradients of several bands: those blind on each."""
-    blind = np.array([params.gradient_range])
-    for monitors in by_band:
         if monitors:
+            k = tests.k_ffd + site.k_md
             own = blind_intervals(monitors, k, fuse=params.fuse, gradient_range=params.gradient_range)
             blind = _intersection(blind, own)
     return blind
@@ -415,11 +402,8 @@ def blind_gradients(
     sigma = differences.nominal_sigma_m[..., [satellite]]
     there = np.isfinite(differences.residual_m[..., [satellite]])
     (place,), _ = _choice(sigma, there, site, params)
-    k_ffd = site.tests[place].k_ffd
-    mask = _band_masks(site, params)[place][:, np.newaxis]
-    able = there & mask & (k_ffd * sigma < _half_wavelength_m(params))
-    code = sum(1 << place for place in np.flatnonzero(able.ravel()).tolist())
-    return _blind(_monitors(code, sigma[..., 0], site.length_m[runway], params), k_ffd + site.k_md, params)
+    code = sum(1 << place for place in np.flatnonzero(there.ravel()).tolist())
+    return _blind(code, sigma[..., 0], site.tests[place], site.length_m[runway], site, params)
 
 
 def _smallest_gradients(
