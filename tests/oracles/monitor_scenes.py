@@ -30,10 +30,10 @@ BRAUNSCHWEIG_M = np.array(
         [3840619.039, 715604.228, 5024909.863],
         [3840835.113, 714861.969, 5024848.587],
         [3841202.939, 715429.959, 5024488.675],
-        [3840882.0, 715289.0, 5024753.0],
+        [3840640.493, 715530.528, 5024903.779],
     ]
 )
-"""Table 1 of the test bed's paper, and the fourth receiver of the suite's configuration, which is its own choice."""
+"""Table 1 of the test bed's paper, and its fourth receiver: 77 m from the first towards the second."""
 RUNWAY_RAD = np.radians(84.73)
 
 
