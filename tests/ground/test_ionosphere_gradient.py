@@ -226,7 +226,7 @@ def test_fronts_over_the_site_match_the_analytic_blind_gradients(orbits, receive
     monitors = [BaselineMonitor(length_m=abs(float(each)), sigma_m=float(sigma[0])) for each in site.length_m[0]]
     blind = blind_intervals(monitors, site.k_ffd)
     # The simulated front is measured in the plane of the first receiver, heights and curvature included: 1e-4 of it.
-    near = np.abs(gradients[:, np.newaxis] - blind.ravel()).min(axis=1) < 1e-4 * gradients
+    near = np.abs(gradients[:, np.newaxis] - blind.ravel()).min(axis=1, initial=np.inf) < 1e-4 * gradients
     expected = np.array([not is_in(each, blind) for each in gradients])
     np.testing.assert_array_equal(found[~near], expected[~near])
     assert near.mean() < 0.05
@@ -386,7 +386,8 @@ def test_second_band_and_all_fusion():
     both = verdict(residual, site)[1]
     single = IonosphereGradientParams(runway_bearing_rad=(RUNWAY_RAD,), bands=(L1,))
     one = verdict(residual[:, :1], gradient_site(BRAUNSCHWEIG_M, BRAUNSCHWEIG_M[0], single), params=single)[1]
-    assert (both.coverage[HERE] > one.coverage[HERE]).all()
+    assert (both.coverage[HERE] >= one.coverage[HERE]).all()
+    assert (both.coverage[HERE] > one.coverage[HERE]).any()
     every = IonosphereGradientParams(runway_bearing_rad=(RUNWAY_RAD,), fuse="all")
     strict = verdict(residual, gradient_site(BRAUNSCHWEIG_M, BRAUNSCHWEIG_M[0], every), params=every)[1]
     assert (strict.coverage <= both.coverage).all()

@@ -32,7 +32,7 @@ class CarrierNoise:
     """
 
     floor_m: tuple[float, ...] = (0.0012, 0.0012, 0.0025)
-    low_m: tuple[float, ...] = (0.010, 0.011, 0.016)
+    low_m: tuple[float, ...] = (0.010, 0.014, 0.016)
     scale_rad: float = float(np.radians(20.0))
     receiver_factor: tuple[float, ...] = (1.0,)
 
