@@ -9,6 +9,9 @@ to Support New Monitoring Algorithms Development for CAT III Precision Approach.
 :mod:`~.optima`          figures 7 and 10, the optima for three and four receivers, grids
 :mod:`~.extensions`      more receivers, all baselines, tolerance, L5
 :mod:`~.noise`           the statistic under noise: analytic P_fa and P_md, and by Monte Carlo
+:mod:`~.projection`      fronts that are not along the runway: projected, and their direction estimated
+:mod:`~.coverage`        what a station's monitor detects on the satellites of a day
+:mod:`~.recorded`        the monitor on recorded pairs of receivers
 :mod:`~.reproduction`    all of it as one report
 =======================  ==========================================================================
 """

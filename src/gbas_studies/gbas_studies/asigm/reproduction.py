@@ -14,6 +14,8 @@ from gbas_studies.asigm.optima import (
     grids_section,
     three_receivers_section,
 )
+from gbas_studies.asigm.projection import projection_section
+from gbas_studies.asigm.recorded import recorded_section
 from gbas_studies.asigm.testbed import braunschweig, geometry_section
 from gbas_studies.reproduction.items import Claim, Reproduction, Section, Value
 from gbas_studies.reproduction.registry import Options
@@ -37,7 +39,7 @@ def reproduce(options: Options) -> Reproduction:
     Parameters
     ----------
     options : Options
-        `data` is not used: the paper has no measurements.
+        Recordings are for what the paper has not: it has no measurements.
     """
     testbed = braunschweig()
     steps: dict[str, Callable[[], Section]] = {
@@ -51,6 +53,8 @@ def reproduce(options: Options) -> Reproduction:
         "fourth receiver": lambda: fourth_receiver_section(testbed),
         "beyond the paper": lambda: extensions_section(options.quick),
         "noise": lambda: noise_section(testbed, quick=options.quick, seed=options.seed, progress=options.progress),
+        "fronts from elsewhere": lambda: projection_section(testbed, quick=options.quick, seed=options.seed),
+        "recorded pairs": lambda: recorded_section(options),
     }
     sections = []
     for name, make in steps.items():
@@ -74,6 +78,7 @@ def constants_section() -> Section:
                 name="k_ffd + k_md",
                 ours=K,
                 unit="",
+                kind="coefficient",
                 definition="3.8906 for false alarms of 1e-4, two-sided, and 3.7190 for missed detections of 1e-4. "
                 "The paper prints neither; with these its optima come out. k scales sigma and moves no optimum",
             ),
@@ -98,6 +103,7 @@ def _misprint() -> Claim:
         holds=abs(printed) < 1e-12,
         paper_text="sigma(alpha) = sigma-hat / (foot - top) (alpha - top) + sigma-hat",
         ours_text=f"as printed {printed:g} sigma-hat at the foot of a tent, where it must be {corrected:g}",
+        kind="coefficient",
         definition="evaluated at the foot, where the gradient's delay is a multiple of the wavelength",
         why="The sign of the slope is wrong, and eq (7) has its indices exchanged. A tent rises from 0 at the foot "
         "to sigma-hat at the top, half way to the next multiple; the paper's figures are drawn so.",

@@ -22,6 +22,9 @@ RECEIVERS_ECEF_M: Final = np.array(
 )
 """RR1 to RR3. Source: table 1."""
 
+FOURTH_ECEF_M: Final = np.array([3840640.493, 715530.528, 5024903.779])
+"""The fourth receiver that the paper proposes, 77 m from RR1 towards RR2."""
+
 RUNWAY_BEARING_DEG: Final = 84.73
 """True bearing of runway 08. Not in the paper; as in the suite's configuration of the site (course 264.73)."""
 
@@ -86,6 +89,7 @@ def geometry_section(testbed: Testbed) -> Section:
             paper=printed,
             ours=testbed.length_m(first, second),
             unit="m",
+            kind="input",
             definition="distance of the positions of table 1",
             tolerance=10.0,
             why="The paper cuts its lengths to tens of metres.",
@@ -99,7 +103,7 @@ def geometry_section(testbed: Testbed) -> Section:
         ("angle of RR1-RR3 to the runway", math.degrees(testbed.angle_rad(1, 3)), "from the vectors: theta + beta"),
         ("theta - beta, as in eq (4)", math.degrees(testbed.theta_rad - testbed.angle_rad(1, 2)), "as printed"),
     ]
-    items = [Value(name=name, ours=value, unit="deg", definition=how) for name, value, how in angles]
+    items = [Value(name=name, ours=value, unit="deg", definition=how, kind="input") for name, value, how in angles]
     return Section(
         title="Table 1: the receivers",
         text="The runway does not run between the two baselines from RR1 but outside, so that the baseline to RR3 "
