@@ -172,3 +172,49 @@ def test_bad_study_is_one_line_that_names_it(arguments: str, text: str):
     (line,) = result.stderr.splitlines()
     assert line.startswith("gbas: ")
     assert text in line
+
+
+# --- gbas study coverage
+
+
+def coverage(*arguments: object) -> Any:
+    return RUNNER.invoke(app, ["study", "coverage", *(str(each) for each in arguments)], prog_name="gbas")
+
+
+def test_coverage_of_a_day():
+    """Two receivers: more noise lower down, so less is covered; the second band never costs anything."""
+    result = coverage("--receivers", 2, "--step", 10_800, "--repetitions", 1, "--json")
+    assert result.exit_code == 0, result.output
+    found = json.loads(result.stdout)
+    assert found["k_md"] == pytest.approx(3.7190, abs=5e-5)
+    assert [len(each) for each in found["k_ffd"].values()] == [1, 3]
+    single, both = (
+        [row["coverage_percent"] for row in found["tables"][f"2 receivers, {bands}"]] for bands in ("L1", "L1+L5")
+    )
+    assert single[0] == 0.0
+    assert single[-1] > single[2]
+    assert all(more >= less for less, more in zip(single, both, strict=True))
+    again = coverage("--receivers", 2, "--step", 10_800, "--repetitions", 1, "--json")
+    assert again.stdout == result.stdout
+
+
+def test_coverage_for_people():
+    result = coverage("--receivers", 2, "--step", 21_600, "--repetitions", 1, "--paper")
+    assert result.exit_code == 0, result.output
+    assert "2 receivers, L1; k_ffd 3.89, k_md 3.72" in result.stdout
+    assert "failed without a gradient: " in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (("--receivers", "5"), "--receivers 5 is not within 2 to 4"),
+        (("--receivers", "1"), "--receivers 1 is not within 2 to 4"),
+        (("--receivers", "two"), "--receivers 'two' is not whole numbers"),
+        (("--step", "1"), "--step 1 is not within 10 to 21600 s"),
+    ],
+)
+def test_bad_coverage_is_one_line_that_names_it(arguments: tuple[str, ...], text: str):
+    result = coverage(*arguments)
+    assert result.exit_code != 0
+    assert text in result.output + str(result.exception)

@@ -131,11 +131,8 @@ def test_one_baseline_and_one_reference_against_the_integral(day):
     elevation[0, :8] = np.radians([80.0, 30.0, 30.0, 30.0, 30.0, 30.0, 30.0, 30.0])
     (row,) = coverage.study(elevation, site, params, np.random.default_rng(3), repetitions=700, bins_deg=(29.0, 31.0))
     sigma = float(np.sqrt(2.0) * np.hypot(*params.noise.sigma_m(np.radians([30.0, 80.0]), (L1,))[0]))
-    from scipy.stats import norm
-
-    star = Star(
-        lengths_m=(abs(float(site.length_m[0, 0])),), sigma_m=sigma, p_false_alarm=float(2 * norm.sf(site.k_ffd))
-    )
+    length_m = abs(float(site.length_m[0, 0]))
+    star = Star(lengths_m=(length_m,), sigma_m=sigma, p_false_alarm=float(2.0 * norm.sf(site.k_ffd)))
     gradients = np.linspace(*GRADIENT_RANGE, 8001)
     expected = 100.0 * (1.0 - float(silent_probability(star, gradients).mean()))
     deviation = 100.0 * 0.5 / np.sqrt(row.trials)
