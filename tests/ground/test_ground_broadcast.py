@@ -81,7 +81,7 @@ def test_thirty_second_corrections_arrive(full):
 
 
 def test_first_measurement_owns_crc_and_rotates(full):
-    station, out = full
+    _station, out = full
     first = {}
     for integrity, bursts in zip(out.integrity, out.bursts, strict=True):
         for message in messages(bursts, Type1):

@@ -66,7 +66,7 @@ class OrbitSite:
     baselines: Baselines
     noise: CarrierNoise
     monitor: EphemerisResidualParams
-    _tables: dict[int, FloatArray] = field(default_factory=dict, repr=False)  # by the set of baselines
+    _tables: dict[bytes, FloatArray] = field(default_factory=dict, repr=False)  # by the baselines that see
 
 
 def supported_decorrelation(site: OrbitSite, elevation_rad: FloatArray, seen: BoolArray | None = None) -> FloatArray:
@@ -86,22 +86,21 @@ def supported_decorrelation(site: OrbitSite, elevation_rad: FloatArray, seen: Bo
         for an elevation that is not known.
     """
     given = np.ones(len(site.baselines), dtype=bool) if seen is None else seen
-    code = int((1 << np.arange(given.size, dtype=np.int64)) @ given) if given.size else 0
-    table = site._tables.get(code)
+    key = given.tobytes()
+    table = site._tables.get(key)
     if table is None:
-        table = site._tables[code] = _table(site, given)
+        table = site._tables[key] = _table(site, given)
     degrees = np.degrees(elevation_rad)
     known = (degrees >= 0.0) & (degrees <= 90.0)
-    below = np.where(known, np.floor(np.where(known, degrees, 0.0)), 0.0).astype(np.int64)
-    above = np.minimum(below + 1, len(table) - 1)
-    return np.where(known, np.maximum(table[below], table[above]), np.inf)
+    return np.where(known, table[np.where(known, degrees, 0.0).astype(np.int64)], np.inf)
 
 
 def _table(site: OrbitSite, seen: BoolArray) -> FloatArray:
-    """The largest P over all azimuths at whole degrees of elevation, (91,)."""
+    """The largest P over all azimuths between a whole degree of elevation and the next, (91,)."""
     elevation, azimuth = (each.ravel() for each in np.meshgrid(_NODES_RAD, _AZIMUTHS_RAD, indexing="ij"))
     found = site_decorrelation(site.baselines, elevation, azimuth, site.noise, site.monitor, seen=seen)
-    return np.asarray(_BETWEEN_AZIMUTHS * found.reshape(len(_NODES_RAD), -1).max(axis=1))
+    nodes = _BETWEEN_AZIMUTHS * found.reshape(len(_NODES_RAD), -1).max(axis=1)
+    return np.asarray(np.maximum(nodes, np.append(nodes[1:], nodes[-1])))
 
 
 def orbit_bound(differences: DoubleDifferences, elevation_rad: FloatArray, site: OrbitSite) -> FloatArray:
@@ -129,14 +128,17 @@ def orbit_bound(differences: DoubleDifferences, elevation_rad: FloatArray, site:
     if count < 2:
         return bound
     seen = np.isfinite(differences.residual_m[:, 0])
-    sigma = np.fmax(differences.sigma_m[:, 0], differences.nominal_sigma_m[:, 0])
-    code = (1 << np.arange(count, dtype=np.int64)) @ seen
-    for each in np.unique(code[code > 0]).tolist():
-        here = code == each
-        rows = np.array([bool(each >> row & 1) for row in range(count)])
-        assumed = assumed_sigma_m(site.baselines, elevation_rad[here], site.noise, site.monitor)
-        excess = np.maximum(1.0, (sigma[:, here] / assumed)[rows].max(axis=0))
-        bound[here] = excess * supported_decorrelation(site, elevation_rad[here], rows)
+    there = np.flatnonzero(np.logical_or.reduce(seen))
+    if not there.size:
+        return bound
+    seen, elevation_rad = seen.take(there, axis=1), elevation_rad.take(there)
+    sigma = np.fmax(differences.sigma_m[:, 0], differences.nominal_sigma_m[:, 0]).take(there, axis=1)
+    ratio = sigma / assumed_sigma_m(site.baselines, elevation_rad, site.noise, site.monitor)
+    excess = np.maximum.reduce(np.where(seen, ratio, 1.0), initial=1.0)
+    code = (1 << np.arange(count)) @ seen
+    for each in set(code.tolist()):
+        here = np.flatnonzero(code == each)
+        bound[there[here]] = excess[here] * supported_decorrelation(site, elevation_rad[here], seen[:, here[0]])
     return bound
 
 
