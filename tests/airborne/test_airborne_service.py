@@ -182,6 +182,26 @@ def test_unhealthy_station(gcid: int) -> None:
     assert np.isnan(position_of(flight.solutions[-1])).all()
 
 
+def test_levels_of_an_unhealthy_station_are_no_service() -> None:
+    """Whoever asks for them gets positions and levels as from a healthy station, an alert and never a service."""
+    healthy = flying(on_approach())
+    unhealthy = flying(on_approach(station_message=station_data(gcid=7)), replace(APPROACH, use_unhealthy=True))
+    last = unhealthy.protections[-1]
+    assert (last.service, last.alert, last.state) == (ServiceType.NONE, 1.0, ApproachState.VDB_ACQUIRED)
+    assert (last.vpl_m, last.lpl_m, last.veb_m) == (
+        healthy.protections[-1].vpl_m, healthy.protections[-1].lpl_m, healthy.protections[-1].veb_m,
+    )  # fmt: skip
+    assert np.array_equal(position_of(unhealthy.solutions[-1]), position_of(healthy.solutions[-1]))
+    assert ServiceType.C not in {protection.service for protection in unhealthy.protections}
+    assert "station_unhealthy" in {event.cause for event in unhealthy.events}
+
+
+def test_asking_for_levels_of_unhealthy_stations_changes_nothing_for_healthy_ones() -> None:
+    one, other = (flying(on_approach(), replace(APPROACH, use_unhealthy=each)) for each in (False, True))
+    assert one.protections[-1].alert == other.protections[-1].alert == 0.0
+    assert one.protections[-1].service == other.protections[-1].service == ServiceType.C
+
+
 def test_station_in_test_mode() -> None:
     flight = flying(on_approach())
     week, tow_s = flight.world.time(DURATION_S)

@@ -38,7 +38,9 @@ def test_smallest_configuration_claims_nothing():
     assert message.sigma_vert_iono_gradient == 25.5e-6
     assert message.refractivity_uncertainty == 255.0
     assert message.adb1.k_md_e_c_gps == 12.75
-    assert station.p_ephemeris == 1.275e-3
+    assert (
+        station.p_ephemeris == station.p_ephemeris_d == 0.0
+    )  # no claim: one receiver's is the largest, test_orbit_claim
     assert station.accuracy_designator == "A"
     assert message.n_reference_receivers is None
 

@@ -217,8 +217,9 @@ def recorded_scene(data: Path, name: str = "mosaic_base_rover", *, warm: int = 7
     epochs = prepared.epochs()
     true_m = truth_ecef_m(name, data, np.array([from_epoch_key(epoch.key)[1] for epoch in epochs]))
     chain = Chain(
-        replace(prepared.ground, settle_time_s=SETTLE_S, ephemeris_settle_s=5.0, readmission_time_s=10.0),
-        replace(prepared.airborne, settle_s=SETTLE_S),
+        # healthy, so that there is a service to lose; the station file claims none for recorded data
+        replace(prepared.ground, gcid=1, settle_time_s=SETTLE_S, ephemeris_settle_s=5.0, readmission_time_s=10.0),
+        replace(prepared.airborne, settle_s=SETTLE_S, use_unhealthy=False),
         prepared.recording.ephemerides(),
         prepared.recording.user_ephemerides(),
     )

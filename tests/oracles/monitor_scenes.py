@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -60,6 +60,17 @@ def station_of(positions_m: FloatArray, systems: str) -> GroundParams:
         receiver_ecef_m=tuple(tuple(float(value) for value in each) for each in positions_m),
         min_receivers=1, require_cn0=False, slots="AB", gcid=1, ephemeris_settle_s=0.0,
     )  # fmt: skip
+
+
+def braunschweig_station(count: int = 4, **sections: Mapping[str, Any]) -> GroundParams:
+    """The demo's site with its first receivers, from a file's sections: what they say is added or replaced."""
+    station = {"id": "EDVE", "latitude_deg": 52.3199737, "longitude_deg": 10.5494973, "height_m": 131.9, "gcid": 1}
+    receivers = {f"rr{row + 1}_ecef_m": place for row, place in enumerate(BRAUNSCHWEIG_M[:count].tolist())}
+    mapping: dict[str, Mapping[str, Any]] = {
+        "station": station, "receivers": {**receivers, "minimum": min(2, count)}, "vdb": {"slots": "ABC"},
+    }  # fmt: skip
+    mapping |= {name: {**mapping.get(name, {}), **values} for name, values in sections.items()}
+    return GroundParams.from_mapping(mapping, source="site.yaml")
 
 
 def monitor_epochs(

@@ -180,7 +180,7 @@ def ranging_sources(
         What the station said about ephemerides.
     """
     tracked = np.isfinite(ranges.smoothed_m)
-    if station is None or not station.healthy or corrections is None:
+    if station is None or corrections is None or not (station.healthy or params.use_unhealthy):
         reason = np.where(tracked, int(Rejection.NO_STATION), int(Rejection.NOT_TRACKED))
         return RangingSources(
             reason=reason,

@@ -99,6 +99,9 @@ class AirborneParams:
     require_ephemeris_bound : bool
         Without K_md_e (ADB1) there is no protection level. The standard allows stations without; then it is for the
         operator to switch this off.
+    use_unhealthy : bool
+        Positions and protection levels from a station that says it is not healthy as well: for recorded data and test
+        beds. There is never a service from it, and always an alert.
     range_test_sigma, range_test_floor_m : float
         A residual beyond this many sigmas and beyond this floor [m] excludes the satellite.
     range_test_max_exclusions : int
@@ -142,6 +145,7 @@ class AirborneParams:
     max_speed_mps: float = 82.0
     speed_history_s: float = 3.5
     require_ephemeris_bound: bool = True
+    use_unhealthy: bool = False
     range_test_sigma: float = 6.0
     range_test_floor_m: float = 10.0
     range_test_max_exclusions: int = 3

@@ -81,8 +81,8 @@ def service_step(
     -------
     state : ServiceState
     protection : ProtectionEpoch
-        Protection levels are NaN unless messages, station and position are all good; `alert` is 1 unless the service
-        is given.
+        Protection levels are NaN unless messages, station and position are all good (with `params.use_unhealthy` the
+        station need not be); `alert` is 1 unless the service is given.
     events : tuple of Event
         One for each change of state, service and cause of alert.
     """
@@ -95,7 +95,7 @@ def service_step(
             params.protection_probability, params.receiver_fault_prior, params.k_ffmd_single
         )
         levels = protection_levels(solution, multipliers)
-        failure = _protection_failure(levels, val_m, lal_m, params)
+        failure = _station_failure(solution) or _protection_failure(levels, val_m, lal_m, params)
     new = _next_state(state, solution, failure)
     protection = ProtectionEpoch(
         gps_week=solution.gps_week,
@@ -125,8 +125,8 @@ def _message_failure(solution: SolutionEpoch, params: AirborneParams) -> Failure
     acquired = ApproachState.VDB_ACQUIRED
     if math.isnan(gcid):
         return Failure(acquired, "no_station_data", math.nan, math.nan)
-    if gcid not in HEALTHY_GCID:
-        return Failure(acquired, "station_unhealthy", gcid, math.nan)
+    if not params.use_unhealthy and (unhealthy := _station_failure(solution)):
+        return unhealthy
     if math.isnan(age_s):
         return Failure(acquired, "no_corrections", math.nan, math.nan)
     if not -params.correction_wait_s <= age_s <= params.mt1_timeout_s:
@@ -136,6 +136,13 @@ def _message_failure(solution: SolutionEpoch, params: AirborneParams) -> Failure
     if params.rpds != NO_FAS and solution.apd not in SERVICE_C_APD:
         return Failure(acquired, "approach_not_for_service", solution.apd, float(APD_C))
     return None
+
+
+def _station_failure(solution: SolutionEpoch) -> Failure | None:
+    """A station that claims nothing gives no service, whatever is computed with its corrections."""
+    if solution.gcid in HEALTHY_GCID:
+        return None
+    return Failure(ApproachState.VDB_ACQUIRED, "station_unhealthy", solution.gcid, math.nan)
 
 
 def _position_failure(solution: SolutionEpoch, params: AirborneParams) -> Failure | None:

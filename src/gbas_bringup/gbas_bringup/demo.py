@@ -19,6 +19,7 @@ from gbas_bringup.run_config import read_run_config
 from gbas_bringup.runs import execute
 from gbas_core.gpstime import epoch_key
 from gbas_core.record import Record
+from gbas_ground.broadcast_claims import statements
 from gbas_ground.params import GroundParams
 from gbas_msgs_py import topics
 from gbas_msgs_py.records import ProtectionEpoch, SolutionEpoch
@@ -106,6 +107,7 @@ def report_bag(bag: Path, directory: Path, *, config: Path) -> DemoResult:
         summary={
             **summarise(rows),
             "errors": error_statistics(rows, truth, course_rad=course_rad),
+            "rests_on": list(statements(station)),
             "simulated": True,
         },
     )

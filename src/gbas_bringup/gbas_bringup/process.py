@@ -17,6 +17,7 @@ from gbas_bringup.results import Row, summarise, write_json, write_solution_csv
 from gbas_core.frames import geodetic_from_ecef
 from gbas_core.recording import RecordedEpoch, Recording
 from gbas_core.rinex import NavigationFile, ObservationFile
+from gbas_ground.broadcast_claims import statements
 from gbas_ground.params import GroundParams, ground_section
 from gbas_msgs_py.events import Event, EventKind
 from gbas_studies.chain import AirborneOutput, Chain
@@ -102,6 +103,7 @@ class ProcessResult:
             "events": _event_counts(self.events),
             "notes": list(self.notes),
             "station": {"id": self.ground.station_id, "designator": self.ground.accuracy_designator},
+            "rests_on": list(statements(self.ground)),
             "simulated": self.simulated,
         }
 
@@ -319,6 +321,7 @@ def _airborne_values(request: ProcessRequest, recording: Recording, ground: Grou
         "systems": request.systems,
         "max_gap_s": max(3.5, 1.5 * (recording.user.interval_s or 0.0)),
         "station_data_timeout_s": min(max(60.0, 30.0 * interval_s), 3600.0),  # they come round in 20 epochs
+        "use_unhealthy": True,  # without a service; a station that claims one is not affected
     }
     if ground.approaches:
         values["rpds"] = ground.approaches[0].rpds

@@ -219,6 +219,8 @@ def summary_lines(summary: dict[str, Any]) -> list[str]:
             f"lateral within LPL in {errors['lateral_bounded_epochs']}; "
             f"worst error/PL {max(errors['vertical_worst_ratio'], errors['lateral_worst_ratio']):.3f}",
         ]
+    if summary.get("rests_on"):
+        lines.append(f"rests on     {', '.join(summary['rests_on'])}")
     if summary.get("simulated"):
         lines.append("data         simulated")
     return lines

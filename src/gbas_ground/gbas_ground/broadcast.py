@@ -17,13 +17,8 @@ from gbas_core.record import FloatArray
 from gbas_core.satellites import RANGING_SOURCE_ID
 from gbas_ground.corrections import BoolArray
 from gbas_ground.monitors.multiple_reference import MAX_B_VALUE_M
-from gbas_ground.params import (
-    GCID_UNHEALTHY,
-    MAX_DECORRELATION,
-    MAX_SIGMA_VIG,
-    MIN_SERVICE_SATELLITES,
-    GroundParams,
-)
+from gbas_ground.orbit_claim import MAX_DECORRELATION
+from gbas_ground.params import GCID_UNHEALTHY, MAX_SIGMA_VIG, MIN_SERVICE_SATELLITES, GroundParams
 from gbas_ground.sigma import MAX_SIGMA_M
 from gbas_msgs_py.records import ChannelState, IntegrityEpoch
 from gbas_msgs_py.vdb.burst import FRAME_DURATION_S, Burst

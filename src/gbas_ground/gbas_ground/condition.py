@@ -13,6 +13,7 @@ from gbas_ground.causes import FIRST_LATCHED, ExclusionCause
 from gbas_ground.consistency import Corrections, Exclusions, Measured
 from gbas_ground.corrections import BoolArray
 from gbas_ground.ephemerides import EphemerisState
+from gbas_ground.orbit_claim import claimed_decorrelation
 from gbas_ground.params import GroundParams
 from gbas_ground.sigma import MAX_SIGMA_M
 from gbas_ground.tracking import Tracks
@@ -97,9 +98,13 @@ def integrity_of(
     measured: Measured,
     made: Corrections,
     condition: Condition,
+    orbit_bound: FloatArray,
     params: GroundParams,
 ) -> IntegrityEpoch:
-    """The record of an epoch: a row for every satellite in view, corrections where they are usable."""
+    """The record of an epoch: a row for every satellite in view, corrections where they are usable.
+
+    `orbit_bound` ``(N,)`` is what the ephemeris monitor supports, which P follows from [m/m].
+    """
     usable = condition.state == ChannelState.USABLE
     row = (condition.state != ChannelState.NOT_TRACKED) | (condition.cause != ExclusionCause.NONE)
 
@@ -109,6 +114,7 @@ def integrity_of(
     def of_usable(values: FloatArray) -> FloatArray:
         return np.where(usable, values, np.nan)
 
+    external = bool(params.external_monitor)
     n_receivers = made.used.shape[0]
     used, b = missing(MAX_REFERENCE_RECEIVERS), missing(MAX_REFERENCE_RECEIVERS)
     used[:n_receivers] = of_row((made.used & usable).astype(np.float64))
@@ -121,8 +127,10 @@ def integrity_of(
         state=of_row(condition.state),
         cause=of_row(condition.cause),
         elevation_rad=of_row(measured.elevation_rad),
-        p_ephemeris=of_usable(np.full(N_SATS, params.p_ephemeris)),
-        p_ephemeris_d=of_usable(np.full(N_SATS, params.p_ephemeris_d)),
+        p_ephemeris=of_usable(claimed_decorrelation(orbit_bound, params.p_ephemeris, external=external)),
+        p_ephemeris_d=of_usable(
+            claimed_decorrelation(orbit_bound, params.p_ephemeris_d or params.p_ephemeris, external=external)
+        ),
         iod=of_row(known.current.iod),
         ephemeris_crc=of_row(known.crc),
         prc_100_m=of_usable(made.prc_m[0]),

@@ -274,6 +274,10 @@ class EphemerisSection(Declared):
     """Broadcast orbits against double-difference carriers."""
 
     exclude: bool = parameter("ephemeris_residual", "exclude", True, "-", "satellites that fail are excluded")
+    required: bool = parameter(
+        "ephemeris_residual", "required", False, "-",
+        "satellites whose orbits it does not bound within the largest P are not used; always so with gast_d.enabled",
+    )  # fmt: skip
     p_false_alarm: float = parameter(
         "ephemeris_residual", "p_false_alarm", FALSE_EXCLUSION, "-", "of one source in 15 s", **_PROBABILITY
     )

@@ -28,7 +28,14 @@ from gbas_core.record import FloatArray
 from gbas_core.satellites import SYSTEM_MASKS
 from gbas_ground.approaches import fas_data_set
 from gbas_ground.declared import REQUIRED, Declared, all_specs, arguments_from, flatten, listed, nested, parameter
+from gbas_ground.gradient_claim import MAX_M_EIG, MAX_Y_EIG_M, GradientClaim, gradient_claim
+from gbas_ground.gradient_claim import refuse_smaller as refuse_smaller_gradient
 from gbas_ground.monitor_params import MonitorParams
+from gbas_ground.monitors.double_difference import baselines_of
+from gbas_ground.monitors.ephemeris_residual import EphemerisResidualParams
+from gbas_ground.monitors.ionosphere_gradient import IonosphereGradientParams, gradient_site
+from gbas_ground.orbit_claim import MAX_DECORRELATION, OrbitSite
+from gbas_ground.orbit_claim import refuse_smaller as refuse_smaller_decorrelation
 from gbas_msgs_py.parameters import ParameterError, unknown_parameters
 from gbas_msgs_py.records import MAX_REFERENCE_RECEIVERS
 from gbas_msgs_py.vdb.block import encode_body
@@ -40,11 +47,11 @@ from gbas_msgs_py.vdb.schedule import ScheduleParams, sources_that_fit
 _DEGREE: Final = math.pi / 180.0
 ROOT_KEY: Final = "ground"
 GCID_UNHEALTHY: Final = 7
+TYPE_D_GCID: Final = (2, 3, 4)
+"""Designators of stations that serve type D as well. Known for 2; what 3 and 4 add is not in a public text."""
 RSDS_NONE: Final = 255
 MAX_SIGMA_VIG: Final = 25.5e-6
 """Largest vertical ionosphere gradient sigma that a type 2 message carries [m/m]."""
-MAX_DECORRELATION: Final = 1.275e-3
-"""Largest ephemeris decorrelation parameter that a type 1 or type 11 message carries [m/m]."""
 MIN_SERVICE_SATELLITES: Final = 4
 """Fewer corrections than this give nobody a position: the station then says that it is not healthy."""
 
@@ -147,20 +154,27 @@ class GroundParams(Declared):
     p_ephemeris: float = parameter(
         "ephemeris",
         "p",
-        MAX_DECORRELATION,
+        0.0,
         "m/m",
-        "decorrelation parameter of the type 1 message",
+        "least decorrelation parameter of the type 1 message; 0: it follows from the station's ephemeris monitor",
         low=0.0,
         high=MAX_DECORRELATION,
     )
     p_ephemeris_d: float = parameter(
         "ephemeris",
         "p_d",
-        MAX_DECORRELATION,
+        0.0,
         "m/m",
-        "decorrelation parameter of the type 11 message",
+        "the same of the type 11 message",
         low=0.0,
         high=MAX_DECORRELATION,
+    )
+    external_monitor: str = parameter(
+        "ephemeris",
+        "external_monitor",
+        "",
+        "-",
+        "what else monitors the orbits and supports p, which is then broadcast as it stands; empty: nothing does",
     )
     k_md_e_pos: float = parameter("ephemeris", "k_md_e_pos", 12.75, "-", "positioning service", low=0.0, high=12.75)
     k_md_e_c: float = parameter("ephemeris", "k_md_e_c", 12.75, "-", "service type C", low=0.0, high=12.75)
@@ -181,8 +195,10 @@ class GroundParams(Declared):
 
     # --- service type D
     gast_d: bool = parameter("gast_d", "enabled", False, "-", "broadcast type 11 messages and additional data block 3")
-    y_eig_m: float = parameter("gast_d", "y_eig_m", 3.0, "m", "ionospheric error at the station", low=0.0, high=3.0)
-    m_eig: float = parameter("gast_d", "m_eig", 0.7e-3, "m/m", "its growth with distance", low=0.0, high=0.7e-3)
+    y_eig_m: float = parameter(
+        "gast_d", "y_eig_m", MAX_Y_EIG_M, "m", "ionospheric error at the station", low=0.0, high=MAX_Y_EIG_M
+    )
+    m_eig: float = parameter("gast_d", "m_eig", MAX_M_EIG, "m/m", "its growth with distance", low=0.0, high=MAX_M_EIG)
 
     # --- vdb
     slots: str = parameter("vdb", "slots", "A", "-", "slots assigned, such as AB or ACEG")
@@ -272,6 +288,8 @@ class GroundParams(Declared):
         _check_sigma_table(self)
         _check_vdb(self)
         _check_messages(self)
+        _check_orbit_claim(self)
+        _check_gradient_claim(self)
 
     @property
     def n_receivers(self) -> int:
@@ -285,6 +303,30 @@ class GroundParams(Declared):
     def reference_point_m(self) -> FloatArray:
         """Reference point of the station, ECEF, ``(3,)`` [m]."""
         return ecef_from_geodetic(self.latitude_rad, self.longitude_rad, self.height_m)
+
+    def gradient_monitor(self) -> IonosphereGradientParams:
+        """Settings of the gradient monitor."""
+        courses = tuple(approach.course_rad for approach in self.approaches)
+        return self.monitors.gradient.params(courses, self.monitors.carrier_noise.params())
+
+    def ephemeris_monitor(self) -> EphemerisResidualParams:
+        """Settings of the ephemeris monitor; its double differences are those of the gradient monitor."""
+        return self.monitors.ephemeris.params(self.gradient_monitor().bands)
+
+    def orbit_site(self) -> OrbitSite:
+        """What the claim of orbits follows from."""
+        pairing = self.gradient_monitor().pairing
+        return OrbitSite(
+            baselines=baselines_of(self.receiver_positions_m(), self.reference_point_m(), pairing),
+            noise=self.monitors.carrier_noise.params(),
+            monitor=self.ephemeris_monitor(),
+        )
+
+    def gradient_claim(self) -> GradientClaim:
+        """Bound on gradients that the station's monitor supports."""
+        monitor = self.gradient_monitor()
+        site = gradient_site(self.receiver_positions_m(), self.reference_point_m(), monitor)
+        return gradient_claim(site, monitor, excludes=self.monitors.gradient.exclude, tau_s=self.tau_s[1])
 
     def station_message(self) -> Type2:
         """Station data as declared; the broadcast puts in what an epoch does not support."""
@@ -497,3 +539,36 @@ def _check_messages(params: GroundParams) -> None:
         raise ParameterError(f"cannot be broadcast: {error}") from None
     if room < MIN_SERVICE_SATELLITES:
         raise ParameterError(f"vdb.slots = {params.slots!r} leaves room for {room} satellites; 4 are needed")
+
+
+def _check_orbit_claim(params: GroundParams) -> None:
+    """What the station does not monitor itself it must not claim, unless it says who does."""
+    if not isinstance(params.external_monitor, str):
+        raise ParameterError(f"ephemeris.external_monitor = {params.external_monitor!r} is not a name")
+    given = {"ephemeris.p": params.p_ephemeris} | ({"ephemeris.p_d": params.p_ephemeris_d} if params.gast_d else {})
+    for key, value in given.items():
+        if params.external_monitor:
+            if value == 0.0:
+                raise ParameterError(
+                    f"{key} is missing: what ephemeris.external_monitor = {params.external_monitor!r} supports"
+                )
+        elif value > 0.0:
+            excludes = params.monitors.ephemeris.exclude
+            try:
+                refuse_smaller_decorrelation(
+                    key, value, params.orbit_site(), params.elevation_mask_rad, excludes=excludes
+                )
+            except ValueError as error:
+                raise ParameterError(str(error)) from None
+
+
+def _check_gradient_claim(params: GroundParams) -> None:
+    """A bound on gradients has to follow from what the gradient monitor detects."""
+    if params.gcid in TYPE_D_GCID and not params.gast_d:
+        raise ParameterError(f"station.gcid = {params.gcid} claims service type D, and gast_d.enabled is false")
+    if not params.gast_d or (params.y_eig_m >= MAX_Y_EIG_M and params.m_eig >= MAX_M_EIG):
+        return
+    try:
+        refuse_smaller_gradient(params.y_eig_m, params.m_eig, params.gradient_claim())
+    except ValueError as error:
+        raise ParameterError(str(error)) from None

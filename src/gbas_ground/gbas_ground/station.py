@@ -314,7 +314,7 @@ def _process(
     new_exclusions = _advanced(new_exclusions, measured, made, followed.channel_ok, watched.passed, dt_s, params)
 
     condition = conclude(followed.tracked, followed.tracks, known, measured, made, new_exclusions, params)
-    integrity = integrity_of(epoch.gps_week, epoch.tow_s, known, measured, made, condition, params)
+    integrity = integrity_of(epoch.gps_week, epoch.tow_s, known, measured, made, condition, watched.orbit_bound, params)
     channels = channel_epoch(
         epoch.gps_week,
         epoch.tow_s,

@@ -67,6 +67,7 @@ from gbas_ground.monitors.two_frequency_divergence import (
     initial_two_frequency,
     two_frequency_step,
 )
+from gbas_ground.orbit_claim import MAX_DECORRELATION, OrbitSite, orbit_bound
 from gbas_ground.params import GroundParams
 from gbas_msgs_py.records import BASELINES, MAX_REFERENCE_RECEIVERS
 
@@ -169,6 +170,8 @@ class Watched:
         What has to be excluded, and why.
     ready : (N,) bool array
         Satellites that every required monitor could judge.
+    orbit_bound : (N,) array
+        P that the ephemeris monitor supports, :func:`~gbas_ground.orbit_claim.orbit_bound` [m/m].
     looks : mapping from a monitor's name to Look
     details : mapping from a field of :class:`MonitorEpoch` to its value
     """
@@ -176,6 +179,7 @@ class Watched:
     satellites: tuple[Verdict, ...]
     channels: tuple[Verdict, ...]
     ready: BoolArray
+    orbit_bound: FloatArray
     looks: Mapping[str, Look]
     details: Mapping[str, Any]
 
@@ -197,16 +201,17 @@ class _Settings(NamedTuple):
     gradient: IonosphereGradientParams
     gradient_required: bool
     ephemeris: EphemerisResidualParams
+    orbit_required: bool
     power: PowerExpectationParams
     site: GradientSite
+    orbit_site: OrbitSite
     troposphere: Troposphere
 
 
 @lru_cache(maxsize=8)
 def _settings(params: GroundParams) -> _Settings:
     sections = params.monitors
-    courses = tuple(approach.course_rad for approach in params.approaches)
-    gradient = sections.gradient.params(courses, sections.carrier_noise.params())
+    gradient = params.gradient_monitor()
     ccd = sections.ccd.params(params.settle_time_s, params.max_gap_s)
     return _Settings(
         ccd=ccd,
@@ -214,9 +219,11 @@ def _settings(params: GroundParams) -> _Settings:
         acceleration=sections.acceleration.params(params.max_gap_s, sections.carrier_noise.receiver_factor),
         gradient=gradient,
         gradient_required=sections.gradient.required or params.gast_d,
-        ephemeris=sections.ephemeris.params(gradient.bands),
+        ephemeris=params.ephemeris_monitor(),
+        orbit_required=not params.external_monitor and (sections.ephemeris.required or params.gast_d),
         power=sections.power.params(params.max_gap_s),
         site=gradient_site(params.receiver_positions_m(), params.reference_point_m(), gradient),
+        orbit_site=params.orbit_site(),
         troposphere=Troposphere(refractivity=params.refractivity, scale_height_m=params.scale_height_m),
     )
 
@@ -248,7 +255,9 @@ def watch(state: WatchState, seen: Seen, params: GroundParams) -> tuple[WatchSta
         steady = steady & ~verdict.result.failed
     differences = _double_differences(residual_m, steady, seen, settings)
     gradient = _gradient(differences, seen, settings, exclude=sections.gradient.exclude)
-    ephemeris, orbit = _ephemeris(state.ephemeris, differences, seen, settings, exclude=sections.ephemeris.exclude)
+    ephemeris, orbit, bound = _ephemeris(
+        state.ephemeris, differences, seen, settings, exclude=sections.ephemeris.exclude
+    )
     power, expectation = _power(
         state.power, seen, settings, exclude=sections.power.exclude, required=params.require_cn0
     )
@@ -261,6 +270,7 @@ def watch(state: WatchState, seen: Seen, params: GroundParams) -> tuple[WatchSta
         satellites=tuple(verdict for part in parts for verdict in part.satellites),
         channels=tuple(verdict for part in parts for verdict in part.channels),
         ready=ready,
+        orbit_bound=bound,
         looks={name: each for part in parts for name, each in part.looks.items()},
         details={name: each for part in parts for name, each in part.details.items()},
     )
@@ -399,15 +409,21 @@ def _gradient(differences: DoubleDifferences, seen: Seen, settings: _Settings, *
 
 def _ephemeris(
     state: EphemerisResidualState, differences: DoubleDifferences, seen: Seen, settings: _Settings, *, exclude: bool
-) -> tuple[EphemerisResidualState, _Part]:
+) -> tuple[EphemerisResidualState, _Part, FloatArray]:
+    """Verdicts, and what an orbit that passes may be wrong by."""
     baselines = settings.site.baselines
     state, result = ephemeris_residual_step(
         state, differences, baselines, seen.due, seen.dt_s, settings.ephemeris, shift_m=seen.shift_m
     )
-    return state, _Part(
+    bound = orbit_bound(differences, seen.expected.elevation_rad, settings.orbit_site)
+    if not exclude:
+        bound = np.full(bound.shape, np.inf)
+    part = _Part(
         looks={"ephemeris": look(result, seen.due & (len(baselines) > 0))},
         satellites=_verdicts(exclude, (ExclusionCause.EPHEMERIS_RESIDUAL, result), seen.due),
+        ready=bound <= MAX_DECORRELATION if settings.orbit_required else None,
     )
+    return state, part, bound
 
 
 def _power(

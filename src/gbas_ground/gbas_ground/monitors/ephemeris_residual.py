@@ -42,6 +42,8 @@ from gbas_ground.monitors.double_difference import Baselines, DoubleDifferences,
 from gbas_ground.monitors.false_alarm import FALSE_EXCLUSION, false_alarm_multiplier
 from gbas_ground.monitors.result import MonitorResult, upper_limit
 
+REFERENCE_ELEVATION_RAD: Final = float(np.radians(30.0))
+"""Lowest reference satellite that a site's P is reckoned with. Ours; :mod:`gbas_ground.orbit_claim` has the epoch's."""
 _PARALLEL: Final = 1e-6  # sine of the angle below which two baselines, seen from the satellite, are one
 
 
@@ -217,7 +219,8 @@ def site_decorrelation(
     noise: CarrierNoise,
     params: EphemerisResidualParams,
     *,
-    reference_elevation_rad: float = float(np.radians(30.0)),
+    seen: BoolArray | None = None,
+    reference_elevation_rad: float = REFERENCE_ELEVATION_RAD,
     descent_rad: float = float(np.radians(3.0)),
 ) -> FloatArray:
     """P a site can claim for satellites at places in the sky.
@@ -230,6 +233,8 @@ def site_decorrelation(
     noise : CarrierNoise
     params : EphemerisResidualParams
         The first band counts, so that the claim holds for satellites with it alone.
+    seen : (B,) bool array, optional
+        Baselines that see the satellites; all if it is left out. Thresholds are those of all, as the monitor has them.
     reference_elevation_rad : float
         Elevation of the lowest reference satellite that has to be reckoned with [rad].
     descent_rad : float
@@ -240,11 +245,29 @@ def site_decorrelation(
     (N,) array
         P [m/m]. The minimum detectable error of an orbit, across the line of sight, is P times the range.
     """
+    sigma = assumed_sigma_m(baselines, elevation_rad, noise, params, reference_elevation_rad=reference_elevation_rad)
+    threshold = (params.multiplier(len(baselines)) + params.k_md) * sigma
+    if seen is not None:
+        threshold = np.where(seen[:, np.newaxis], threshold, np.nan)
+    level = np.cos(elevation_rad)
+    los = np.stack([level * np.sin(azimuth_rad), level * np.cos(azimuth_rad), np.sin(elevation_rad)])
+    return decorrelation(baselines.vector_m, threshold, los, descent_rad=descent_rad)
+
+
+def assumed_sigma_m(
+    baselines: Baselines,
+    elevation_rad: FloatArray,
+    noise: CarrierNoise,
+    params: EphemerisResidualParams,
+    *,
+    reference_elevation_rad: float = REFERENCE_ELEVATION_RAD,
+) -> FloatArray:
+    """Sigma of the first band's double differences that a site's P is reckoned with, ``(B, N)`` [m].
+
+    Parameters are those of :func:`site_decorrelation`.
+    """
     factors = noise.factors(len(baselines.place_m))
     scale = np.hypot(factors[baselines.first], factors[baselines.second])[:, np.newaxis]
     sigma = noise.sigma_m(elevation_rad, params.bands[:1])
     reference = noise.sigma_m(np.array([reference_elevation_rad]), params.bands[:1])
-    threshold = (params.multiplier(len(baselines)) + params.k_md) * scale * np.hypot(sigma, reference)
-    level = np.cos(elevation_rad)
-    los = np.stack([level * np.sin(azimuth_rad), level * np.cos(azimuth_rad), np.sin(elevation_rad)])
-    return decorrelation(baselines.vector_m, threshold, los, descent_rad=descent_rad)
+    return np.asarray(scale * np.hypot(sigma, reference))
