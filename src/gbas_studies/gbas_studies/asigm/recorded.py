@@ -186,9 +186,9 @@ def recorded_section(options: Options) -> Section:
     return Section(
         title=_TITLE,
         text="Not in the paper, which has no measurements. Two receivers with ordinary antennas on surveyed points and "
-        "no gradient: the statistic is noise, multipath and what the survey is wrong by. The model is the one a "
-        "station has unless its file says otherwise; it was made from these recordings, so that this is no independent "
-        "test of it.",
+        "no gradient: the statistic is noise, multipath and what the survey is wrong by, against the middle one of up "
+        "to five reference satellites, which is quieter than one. The model is the one a station has unless its file "
+        "says otherwise; it was made from these recordings, so that this is no independent test of it.",
         items=items,
         pictures=pictures,
     )
