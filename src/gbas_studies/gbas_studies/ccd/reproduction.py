@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gbas_studies.ccd import beyond, empirical, figures, tables
+from gbas_studies.ccd import beyond, empirical, figures, structure, tables
 from gbas_studies.reproduction.items import Reproduction
 from gbas_studies.reproduction.registry import Options
 
@@ -17,7 +17,7 @@ def reproduce(options: Options) -> Reproduction:
     options.progress("tables")
     sections = [
         tables.thresholds(),
-        tables.algebra(),
+        structure.algebra(),
         *empirical.sections(options),
         figures.figure_5_and_6(),
         tables.table_3(),
