@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gbas_studies.ccd import beyond, empirical, figures, structure, tables
+from gbas_studies.ccd import beyond, compliance_items, empirical, figures, structure, tables
 from gbas_studies.reproduction.items import Reproduction
 from gbas_studies.reproduction.registry import Options
 
@@ -27,6 +27,7 @@ def reproduce(options: Options) -> Reproduction:
         tables.critical_mappings(),
         tables.table_5(),
         tables.table_6(),
+        compliance_items.section(),
         beyond.rare_events(options),
         *beyond.simulated(options),
     ]

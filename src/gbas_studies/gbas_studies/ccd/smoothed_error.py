@@ -146,6 +146,34 @@ def unit_error_s(
     return smoothed_cmc_s(air_start, sample, smoothing) - smoothed_cmc_s(ground_start, sample, smoothing)
 
 
+def largest_error_s(
+    since_s: ArrayLike, smoothing: Smoothing, *, ground_start: int = LONG_BEFORE, oldest_s: float = 600.0
+) -> FloatArray:
+    """Largest differential error over the rate of code minus carrier, over all users, at times since the onset.
+
+    Parameters
+    ----------
+    since_s : (n,) array
+        Whole intervals of the filters [s].
+    smoothing : Smoothing
+    ground_start : int
+        Start of the ground filter in samples from the onset; settled when not given.
+    oldest_s : float
+        Users whose filter started up to so long before the onset, and at least the delay to incorporation ago [s].
+
+    Returns
+    -------
+    (n,) array
+        Metres for 1 m/s, so seconds.
+    """
+    sample = np.rint(np.asarray(since_s, dtype=np.float64) / smoothing.interval_s)
+    start = np.arange(-round(oldest_s / smoothing.interval_s), sample.max() - smoothing.updates + 1.0)
+    ground = smoothed_cmc_s(ground_start, sample, smoothing)
+    error = np.abs(smoothed_cmc_s(start[:, np.newaxis], sample, smoothing) - ground)
+    error = np.where(start[:, np.newaxis] <= sample - smoothing.updates, error, 0.0)
+    return np.asarray(error.max(axis=0, initial=0.0))
+
+
 def evaluation_sample(air_start: ArrayLike, smoothing: Smoothing) -> FloatArray:
     """Sample at which the air first uses the range, from the onset."""
     return np.asarray(air_start, dtype=np.float64) + smoothing.updates

@@ -15,8 +15,7 @@ from typing import Final
 
 import numpy as np
 
-from gbas_core.record import FloatArray
-from gbas_studies.ccd.smoothed_error import LONG_BEFORE, Smoothing, smoothed_cmc_s
+from gbas_studies.ccd.smoothed_error import Smoothing, largest_error_s
 
 MALFUNCTION_LIMIT_M: Final = 1.6
 IONOSPHERE_LIMIT_M: Final = 2.75
@@ -25,31 +24,6 @@ CORRECTION_AGE_S: Final = 1.5
 TIME_TO_ALERT_S: Final = 1.5
 """Of the ground station, GAST D (known)."""
 _SEARCH_S: Final = 600.0
-
-
-def divergence_error_s(since_s: FloatArray, smoothing: Smoothing) -> FloatArray:
-    """Largest differential error over the rate of code minus carrier, over all users, at times since the onset [s].
-
-    Parameters
-    ----------
-    since_s : (n,) array
-        Whole intervals of the filters [s].
-    smoothing : Smoothing
-
-    Returns
-    -------
-    (n,) array
-        Metres for 1 m/s.
-
-    Source: ENC 2015, eq (19) to (22), in closed form (:mod:`gbas_studies.ccd.smoothed_error`).
-    """
-    sample = np.rint(np.asarray(since_s) / smoothing.interval_s)
-    oldest = -round(_SEARCH_S / smoothing.interval_s)
-    start = np.arange(oldest, sample.max() - smoothing.updates + 1.0)
-    ground = smoothed_cmc_s(LONG_BEFORE, sample, smoothing)
-    error = np.abs(smoothed_cmc_s(start[:, np.newaxis], sample, smoothing) - ground)
-    error = np.where(start[:, np.newaxis] <= sample - smoothing.updates, error, 0.0)
-    return np.asarray(error.max(axis=0, initial=0.0))
 
 
 def divergence_limit_s(
@@ -67,7 +41,7 @@ def divergence_limit_s(
         How long to look [s].
     """
     since_s = np.arange(0.0, watch_s, smoothing.interval_s)
-    beyond = np.abs(rate_mps) * divergence_error_s(since_s, smoothing) > limit_m
+    beyond = np.abs(rate_mps) * largest_error_s(since_s, smoothing) > limit_m
     return float(since_s[beyond.argmax()]) if beyond.any() else math.inf
 
 
