@@ -10,6 +10,7 @@ import pytest
 from divergence_loops import ccd_statistic, differential_error
 from gbas_core.divergence import ramp_response
 from gbas_core.fault_modes import FAULT_MODES
+from gbas_studies.ccd import station_items
 from gbas_studies.ccd.monitors import MONITORS, cmc_rate, monitor_for
 from gbas_studies.ccd.smoothed_error import (
     LONG_BEFORE,
@@ -19,7 +20,6 @@ from gbas_studies.ccd.smoothed_error import (
     stepped_error_m,
     unit_error_s,
 )
-from gbas_studies.ccd import station_items
 from gbas_studies.ccd.station_items import SETTLE_S, largest_error_m
 from gbas_studies.ccd.worst_case import (
     Grid,

@@ -51,9 +51,9 @@ def ground_age() -> Section:
     items += [_agreement(), _no_worse_than_settled()]
     return Section(
         title="Age of the ground filter, t_g", items=items, pictures=(_age_picture(),),
-        text="The tables take the ground filter as settled. A range that is used while the ground filter is young has a "
-        "larger undetected error, because the ground then lags less than it will; a station that waits for its filters "
-        "has none of that.",
+        text="The tables take the ground filter as settled. A range that is used while the ground filter is young has "
+        "a larger undetected error, because the ground then lags less than it will; a station that waits for its "
+        "filters has none of that.",
     )  # fmt: skip
 
 
@@ -135,7 +135,7 @@ def receivers() -> Section:
             )  # fmt: skip
     return Section(
         title="Averaging over receivers, Q/M", items=items,
-        text="The paper divides all of Q by M. Of the sound form only what is each receiver's own is divided: the noise "
-        "and multipath of the codes. Satellite clock, orbit and troposphere in the compensated carrier are the same at "
-        "all receivers; a station calibrates how much of each it has.",
+        text="The paper divides all of Q by M. Of the sound form only what is each receiver's own is divided: the "
+        "noise and multipath of the codes. Satellite clock, orbit and troposphere in the compensated carrier are alike "
+        "at all receivers; a station calibrates how much of each it has.",
     )  # fmt: skip

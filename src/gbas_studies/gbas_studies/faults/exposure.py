@@ -5,7 +5,7 @@ settled, and the worst user's started whenever it hurts most, but at least the d
 code and carrier share reach the user only through the age of the corrections.
 
 Source of the limits: range-domain requirement of GAST D, ICAO Annex 10 vol. I, att. D: a ranging source malfunction of
-more than 1.6 m must not stay undetected (known); the ionosphere's 2.75 m at the threshold (known).
+more than 1.6 m must not stay undetected (known). Of fronts: :mod:`~.front_exposure`.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ import numpy as np
 from gbas_studies.ccd.smoothed_error import Smoothing, largest_error_s
 
 MALFUNCTION_LIMIT_M: Final = 1.6
-IONOSPHERE_LIMIT_M: Final = 2.75
 CORRECTION_AGE_S: Final = 1.5
 """Oldest correction a user extrapolates while nothing is lost: 0.5 s from Z-count to burst, two frames. Ours."""
 TIME_TO_ALERT_S: Final = 1.5
@@ -69,27 +68,3 @@ def extrapolation_limit_s(
         return float(since[beyond.argmax()])
     lasting = 0.5 * acceleration_mps2 * (CORRECTION_AGE_S**2 + CORRECTION_AGE_S * interval_s)
     return CORRECTION_AGE_S if abs(lasting) > limit_m else math.inf
-
-
-def front_limit_s(
-    gradient: float, closing_mps: float, distance_m: float, smoothing: Smoothing, limit_m: float = IONOSPHERE_LIMIT_M
-) -> float:
-    """When a front that has begun to delay the station's ranges costs a user on approach more than the limit [s].
-
-    Parameters
-    ----------
-    gradient : float
-        Slant gradient [m/m].
-    closing_mps : float
-        Speed of the user's line of sight into the gradient [m/s].
-    distance_m : float
-        Of the user from the station [m].
-    smoothing : Smoothing
-    limit_m : float
-
-    Notes
-    -----
-    The user is on the front's slope already: ``g (x + 2 tau v)``, at once or never. With the front between user and
-    station the error is smaller.
-    """
-    return 0.0 if abs(gradient) * (distance_m + 2.0 * smoothing.tau_s * closing_mps) > limit_m else math.inf
