@@ -2,7 +2,16 @@
 
 from __future__ import annotations
 
-from gbas_studies.ccd import beyond, compliance_items, empirical, figures, station_items, structure, tables
+from gbas_studies.ccd import (
+    availability,
+    beyond,
+    compliance_items,
+    empirical,
+    figures,
+    station_items,
+    structure,
+    tables,
+)
 from gbas_studies.reproduction.items import Reproduction
 from gbas_studies.reproduction.registry import Options
 
@@ -29,6 +38,7 @@ def reproduce(options: Options) -> Reproduction:
         tables.table_6(),
         compliance_items.section(),
         *station_items.sections(),
+        availability.section(quick=options.quick),
         beyond.rare_events(options),
         *beyond.simulated(options),
     ]
