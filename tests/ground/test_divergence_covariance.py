@@ -194,3 +194,38 @@ def test_a_covariance_that_is_none_is_refused(wrong, match):
 def test_white_is_checked():
     with pytest.raises(ValueError, match="white"):
         measurement_covariance(np.ones(4), L1, L5, alpha=0.1, interval_s=0.5, clock_satellites=1.0, white="pink")
+
+
+def test_the_default_is_the_printed_bound_for_one_receiver_and_divides_the_codes_alone():
+    default, printed = StatisticCovariance(), PRINTED_COVARIANCE[np.ix_([0, 1, 3], [0, 1, 3])]
+    one, four = (default.at(np.ones(1), np.full(1, count), np.full(1, np.inf))[0] for count in (1.0, 4.0))
+    assert one == pytest.approx(printed, rel=1e-12)
+    assert four[2] == pytest.approx(printed[2], rel=1e-12)  # all that has the carrier in it
+    assert np.diag(four)[:2] == pytest.approx(0.25 * np.diag(printed)[:2], rel=1e-4)
+
+
+@pytest.mark.parametrize("receivers", [1, 2, 4])
+def test_what_averaging_divides_through_the_filters(receivers):
+    """Codes' noise of each receiver, carriers' noise of the satellites: plain loops and scipy's filter against Q(M, n).
+
+    The receiver clock is averaged over n other satellites, whose carriers have noise of their own.
+    """
+    rng, clock, epochs, alpha = np.random.default_rng(5), 4, 60_000, 0.2
+    code = rng.standard_normal((receivers, 2, epochs)) * np.array([0.3, 0.2])[:, np.newaxis]
+    carrier = rng.standard_normal((1 + clock, 2, epochs)) * 0.02  # the same at all receivers
+    df, other_df, _, phase = four_statistics(code[:, 0], code[:, 1], carrier[0, 0], carrier[0, 1])
+    others = np.mean([four_statistics(0.0, 0.0, *each)[3] for each in carrier[1:]], axis=0)
+    statistics = np.array([df, other_df, np.broadcast_to(phase - others, df.shape)]).mean(axis=1)
+    found = np.cov(filtered_rates(np.diff(statistics, axis=1), alpha)[:, 200:])
+    parts = [
+        measurement_covariance(np.array(sigmas), L1, L5, alpha=alpha, interval_s=1.0, clock_satellites=np.inf,
+                               white="measurement")[np.ix_([0, 1, 3], [0, 1, 3])]
+        for sigmas in ((0.3, 0.2, 0.0, 0.0), (0.0, 0.0, 0.02, 0.02))
+    ]  # fmt: skip
+    receiver, common = (tuple(map(tuple, part)) for part in parts)
+    ours = StatisticCovariance(receiver=receiver, common=common).at(
+        np.ones(1), np.full(1, float(receivers)), np.full(1, float(clock))
+    )[0]
+    # 60 000 epochs, neighbours correlated over some five: three standard deviations of a variance are 4 %.
+    scale = np.sqrt(np.outer(np.diag(ours), np.diag(ours)))
+    assert found / scale == pytest.approx(ours / scale, abs=0.04)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
 
-from gbas_studies.ccd import beyond, empirical, figures, tables
+from gbas_studies.ccd import beyond, empirical, figures, structure, tables
 from gbas_studies.ccd.monitors import one_sided_threshold_mps
 from gbas_studies.ccd.worst_case import smallest_mapping, worst_error
 from gbas_studies.reproduction.items import Section, Verdict
@@ -60,14 +61,49 @@ def test_thresholds():
 
 
 def test_structure():
-    section = tables.algebra()
+    section = structure.algebra()
     verdicts = {each.name: each.verdict for each in section.items}
     assert item(section, "Smallest eigenvalue of Q, eq (18)").ours == pytest.approx(-6.2e-11, abs=0.05e-11)
     wrong = {name for name, verdict in verdicts.items() if verdict is Verdict.DIFFERS and name.startswith("Eq (16)")}
-    places = {f"Eq (16), Q({row},4), {each}" for row in (3, 4) for each in tables._MEASUREMENTS}
+    places = {f"Eq (16), Q({row},4), {each}" for row in (3, 4) for each in structure._MEASUREMENTS}
     assert wrong == places - {"Eq (16), Q(3,4), code L5", "Eq (16), Q(3,4), carrier L5"}
     for name in ("DF1", "DF5", "IF code", "IF carrier"):
         assert verdicts[f"Eq (18) against table 2, {name}"] is Verdict.REPRODUCED
+
+
+def test_rank_and_null_space_in_whole_numbers():
+    # A second way to both verdicts: with gamma = (154/115)^2 all coefficients are fractions, and elimination is exact.
+    gamma = Fraction(154, 115) ** 2
+    near, far = gamma / (gamma - 1), -1 / (gamma - 1)
+    divergence = 2 / (1 - gamma)
+    rows = [
+        [1, 0, -1 + divergence, -divergence],
+        [0, 1, -2 * gamma / (gamma - 1), -1 + 2 * gamma / (gamma - 1)],
+        [near, far, -near, -far],
+        [0, 0, near, far],
+    ]
+    assert [near * a + far * b for a, b in zip(rows[0], rows[1], strict=True)] == rows[2]
+    assert [sum(c * x for c, x in zip(row, (1, gamma, -1, -gamma), strict=True)) for row in rows] == [0, 0, 0, 0]
+    independent = rows[0][0] * rows[1][1] * rows[3][2]  # rows 1, 2, 4 are in echelon form
+    assert independent != 0
+    section = structure.algebra()
+    rank, null = (
+        item(section, name) for name in ("Four statistics, 4 degrees of freedom", "Zero means only without fault")
+    )
+    assert (rank.holds, rank.ours_text) == (False, "rank 3, of the covariance 3")
+    assert (null.holds, null.ours_text) == (False, f"(1, {float(gamma):.4g}, -1, -{float(gamma):.4g}) has zero means")
+    # and a matrix without the defect is not accused of it
+    sound = np.array([[1.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, -1.0], [1.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 1.1]])
+    assert structure._rank(sound).holds
+    assert structure._null_space(sound).holds
+
+
+def test_noise_after_the_filters():
+    found = item(structure.algebra(), "Noise after the filters, eq (7)")
+    assert found.holds is False
+    # Noise through the filters against the exact gains; 400 channels of 400 s are some 3000 independent values.
+    assert structure.noise_ratio("rate") == pytest.approx(1.0 / 10.86, rel=0.04)
+    assert structure.noise_ratio("range") == pytest.approx(1.0 / 453.2, rel=0.04)
 
 
 def test_table_3():

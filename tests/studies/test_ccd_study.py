@@ -10,6 +10,7 @@ import pytest
 from divergence_loops import ccd_statistic, differential_error
 from gbas_core.divergence import ramp_response
 from gbas_core.fault_modes import FAULT_MODES
+from gbas_studies.ccd import station_items
 from gbas_studies.ccd.monitors import MONITORS, cmc_rate, monitor_for
 from gbas_studies.ccd.smoothed_error import (
     LONG_BEFORE,
@@ -19,6 +20,7 @@ from gbas_studies.ccd.smoothed_error import (
     stepped_error_m,
     unit_error_s,
 )
+from gbas_studies.ccd.station_items import SETTLE_S, largest_error_m
 from gbas_studies.ccd.worst_case import (
     Grid,
     response,
@@ -74,6 +76,46 @@ def test_settled_filters_do_not_differ():
 def test_a_young_ground_filter_with_the_air_filter_makes_no_error():
     assert unit_error_s(30, Smoothing(), ground_start=30) == pytest.approx(0.0, abs=1e-12)
     assert abs(unit_error_s(30, Smoothing(), ground_start=LONG_BEFORE)) > 1.0
+
+
+@pytest.mark.parametrize("start", STARTS)
+@pytest.mark.parametrize("age_s", [0.0, 7.5, 40.0, 300.0])
+def test_sweep_with_a_young_ground_filter_is_the_loop(start, age_s):
+    grid = Grid(d_step_mps=0.02, d_max_mps=0.1, onset_step_s=20.0, onset_max_s=100.0)
+    smoothing = Smoothing(start=start, ground_age_s=age_s, ground_settle_s=90.0)
+    error, _, found = study("Code L1", "gast-d", smoothing, grid)
+    worst = 0.0
+    for t_a, ours in zip(found.offset_s, found.error_s, strict=True):
+        used = t_a + 49.5 >= 90.0 - age_s
+        variant = start == "variant"
+        size = differential_error(1.0, 0.0, float(t_a), variant=variant, t_g=-age_s) if used else 0.0
+        assert ours == pytest.approx(size, abs=1e-10)
+        for d in (0.02, 0.04, 0.06, 0.08, 0.1):
+            worst = max(worst, d * size) if d * ccd_statistic(1.0, float(t_a)) <= 0.0233 else worst
+    assert error.value == pytest.approx(worst, abs=1e-10)
+
+
+def test_a_ground_filter_released_early_is_worse_than_a_settled_one():
+    settled_m = largest_error_m("Code L1", "gast-d", Smoothing())[0]
+    assert largest_error_m("Code L1", "gast-d", Smoothing(ground_age_s=0.0))[0] > 2.0 * settled_m
+    waiting = Smoothing(ground_age_s=0.0, ground_settle_s=SETTLE_S)
+    assert largest_error_m("Code L1", "gast-d", waiting)[0] <= settled_m
+    assert largest_error_m("Code L1", "gast-d", Smoothing(ground_age_s=3600.0))[0] == pytest.approx(settled_m)
+    for section in station_items.sections():
+        assert all(each.holds for each in section.items if hasattr(each, "holds"))
+
+
+def test_averaging_divides_what_is_a_receivers_own():
+    # All of Q over M makes every statistic sqrt(M) larger, and the rate that is just not detected as much smaller.
+    one, four = (largest_error_m("Code L5", "gast-f-paper", Smoothing(), receivers=count)[0] for count in (1, 4))
+    assert one / four == pytest.approx(2.0, rel=1e-6)
+    # The codes' part is a receiver's own; what the carrier alone shows is not.
+    gains = {mode: [monitor_for("gast-f-sound", mode, receivers=count).gain for count in (1, 4)]
+             for mode in ("Code L5", "Carrier L5")}  # fmt: skip
+    assert gains["Code L5"][1] / gains["Code L5"][0] == pytest.approx(2.0, rel=1e-3)
+    assert 1.0 < gains["Carrier L5"][1] / gains["Carrier L5"][0] < 2.0
+    with pytest.raises(StudyError, match="receivers is 0"):
+        monitor_for("gast-f-sound", "Code L5", receivers=0)
 
 
 @pytest.mark.parametrize("start", STARTS)

@@ -12,11 +12,10 @@ from gbas_core.smoothing import SmoothingParams, initial_smoothing, smooth_step
 from gbas_ground.params import GroundParams
 from gbas_sim.faults import CodeCarrierDivergence, ExcessiveAcceleration
 from gbas_sim.scenario import read_sections, scenario_from_yaml
-from gbas_studies.ccd.smoothed_error import Smoothing, StudyError
+from gbas_studies.ccd.smoothed_error import Smoothing, StudyError, largest_error_s
 from gbas_studies.faults.campaign import KINDS, QUIET_S, WORLD_S, cases_of, run_campaign
 from gbas_studies.faults.exposure import (
     TIME_TO_ALERT_S,
-    divergence_error_s,
     divergence_limit_s,
     extrapolation_limit_s,
 )
@@ -54,7 +53,7 @@ def test_the_worst_users_error_is_that_of_the_suites_own_filters():
     ground = smoothed(-600.0)
     for begin_s in np.arange(-60.0, now_s - 49.5 + 0.25, 0.5):
         worst = max(worst, abs(smoothed(begin_s) - ground))
-    assert divergence_error_s(np.array([now_s]), Smoothing())[0] == pytest.approx(worst, rel=1e-9)
+    assert largest_error_s(np.array([now_s]), Smoothing())[0] == pytest.approx(worst, rel=1e-9)
 
 
 def test_limits():

@@ -42,6 +42,15 @@ def ccd(
     exclusion_delay: Annotated[
         float, typer.Option(help="From the monitor's alarm to the exclusion at the user [s]; the paper has none.")
     ] = 0.0,
+    ground_age: Annotated[
+        float | None,
+        typer.Option(help="t_g: from the ground filter's start to the fault's onset [s] (default: it has settled)."),
+    ] = None,
+    ground_settle: Annotated[
+        float,
+        typer.Option(help="From the ground filter's start to the first use of the range [s]; the paper has none."),
+    ] = 0.0,
+    receivers: Annotated[int, typer.Option(help="Reference receivers averaged by the gast-f monitors.", min=1)] = 1,
     error_on: Annotated[
         str | None, typer.Option(help="Error of L1, L5 or IF ranges (default: L1, L5 where only L5 is at fault).")
     ] = None,
@@ -58,10 +67,14 @@ def ccd(
     from gbas_studies.ccd.worst_case import Grid, study, worst_error_any_rate
 
     grid = Grid(d_step_mps=d_step, d_max_mps=d_max, onset_step_s=onset_step, onset_max_s=onset_max)
-    smoothing = Smoothing(start=start_of(variant), delay_s=delay)
+    smoothing = Smoothing(
+        start=start_of(variant), delay_s=delay, ground_settle_s=ground_settle,
+        ground_age_s=float("inf") if ground_age is None else ground_age,
+    )  # fmt: skip
     error, mapping, found = study(
-        mode, monitor, smoothing, grid, error_on=error_on_of(error_on), exclusion_delay_s=exclusion_delay
-    )
+        mode, monitor, smoothing, grid, error_on=error_on_of(error_on), exclusion_delay_s=exclusion_delay,
+        receivers=receivers,
+    )  # fmt: skip
     anywhere = worst_error_any_rate(found, d_max)
     if as_json:
         print_json(

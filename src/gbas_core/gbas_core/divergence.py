@@ -272,6 +272,21 @@ def white_noise_gain(alpha: float) -> float:
     return float(np.sqrt(2.0 * alpha**3 / (2.0 - alpha) ** 3))
 
 
+def white_noise_correlation(alpha: float) -> float:
+    """Correlation of F2 between successive epochs for white noise in the value, of a settled filter [-].
+
+    Noise that is itself correlated, and a white rate, leave F2 smoother: this is the least correlation there is to
+    expect, 0.967 for T = 0.5 s and tau = 30 s (continuous: ``(1 - t / tau) exp(-t / tau)``).
+
+    Source: ours, autocovariance of the impulse response of :func:`white_noise_gain`, ``(q^2 + 2 q - 1) / 2`` exactly
+    with ``q = 1 - a``.
+    """
+    if not 0.0 < alpha <= 1.0:
+        raise ValueError(f"alpha is {alpha}: it must be above 0 and at most 1")
+    q = 1.0 - alpha
+    return 0.5 * (q * q + 2.0 * q - 1.0)
+
+
 def white_rate_gain(alpha: float) -> float:
     """Standard deviation of F2 over that of a white rate.
 

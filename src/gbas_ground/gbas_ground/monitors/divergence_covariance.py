@@ -35,12 +35,30 @@ PRINTED_COVARIANCE: Final[FloatArray] = 1e-5 * np.array(
 )
 INDEPENDENT: Final = (0, 1, 3)
 """Places of the three independent statistics among the paper's four."""
-_ZERO: Final[Matrix3] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
 def _matrix3(values: FloatArray) -> Matrix3:
     first, second, third = (tuple(float(value) for value in row) for row in values)
     return first, second, third  # type: ignore[return-value]
+
+
+def carrier_part(covariance: FloatArray) -> FloatArray:
+    """Part of a covariance that comes with its last statistic, the carrier; what is left has no carrier in it.
+
+    Parameters
+    ----------
+    covariance : (n, n) array
+
+    Returns
+    -------
+    (n, n) array
+        Of rank one: the carrier's variance, its covariances, and what these explain of the other variances.
+    """
+    column = covariance[:, -1]
+    return np.asarray(np.outer(column, column) / covariance[-1, -1])
+
+
+_PUBLISHED: Final[FloatArray] = PRINTED_COVARIANCE[np.ix_(INDEPENDENT, INDEPENDENT)]
 
 
 def measurement_covariance(
@@ -101,12 +119,15 @@ class StatisticCovariance:
 
     Notes
     -----
-    The default is the paper's printed bound on all receivers together, so more receivers do not make it smaller: how
-    much of it is common is not known. A station calibrates its own with :func:`calibrate`.
+    The default is the paper's printed bound, of one receiver. The paper divides all of it by M. Divergence-free code
+    minus carrier has nothing in it but noise and multipath of one antenna, so that this part is each receiver's own.
+    The compensated carrier also has what all receivers see alike: satellite clock and orbit, the troposphere, and the
+    clock satellites' share of these; this part is common, and not divided. Uncertain, ours: how much of the carrier's
+    is a receiver's own is not known from one receiver. A station calibrates its own with :func:`calibrate`.
     """
 
-    receiver: Matrix3 = _ZERO
-    common: Matrix3 = _matrix3(PRINTED_COVARIANCE[np.ix_(INDEPENDENT, INDEPENDENT)])
+    receiver: Matrix3 = _matrix3(_PUBLISHED - carrier_part(_PUBLISHED))
+    common: Matrix3 = _matrix3(carrier_part(_PUBLISHED))
     elevation_rad: tuple[float, ...] = ()
     factor: tuple[Triple, ...] = ()
 

@@ -16,7 +16,7 @@ from gbas_core.divergence import GROUND, GROUND_SIGMA_MPS, GROUND_THRESHOLD_MPS
 from gbas_core.fault_modes import FAULT_MODES, fault_direction
 from gbas_core.record import FloatArray
 from gbas_core.signals import L1, L5
-from gbas_ground.monitors.divergence_covariance import INDEPENDENT, PRINTED_COVARIANCE
+from gbas_ground.monitors.divergence_covariance import INDEPENDENT, PRINTED_COVARIANCE, StatisticCovariance
 from gbas_ground.monitors.two_frequency_divergence import threshold
 from gbas_studies.ccd.smoothed_error import StudyError
 
@@ -58,7 +58,7 @@ class Monitor:
 
 def monitor_for(
     name: str, mode: str, *, error_on: ErrorOn | None = None, rounded: bool = False,
-    threshold_mps: float = GROUND_THRESHOLD_MPS,
+    threshold_mps: float = GROUND_THRESHOLD_MPS, receivers: int = 1,
 ) -> Monitor:  # fmt: skip
     """The monitor `name` as it sees `mode`.
 
@@ -72,13 +72,18 @@ def monitor_for(
     rounded : bool
         Use the paper's rounded coefficients of eq (17) in the form "paper".
     threshold_mps : float
-        Of the GAST D monitor [m/s].
+        Of the GAST D monitor, whose sigma and threshold are those of the mean over receivers [m/s].
+    receivers : int
+        M, averaged by the GAST F monitors: the form "paper" divides all of its covariance, the form "sound" only what
+        is each receiver's own (:class:`gbas_ground.monitors.divergence_covariance.StatisticCovariance`).
 
     Raises
     ------
     StudyError
-        For an unknown name or mode.
+        For an unknown name or mode, and without receivers.
     """
+    if receivers < 1:
+        raise StudyError(f"receivers is {receivers}: at least one is needed")
     if name not in MONITORS:
         raise StudyError(f"monitor {name!r} is not one of {', '.join(MONITORS)}")
     direction = direction_of(mode)
@@ -87,10 +92,9 @@ def monitor_for(
         seen = {"L1": rates[0], "L5": rates[1], "IF": rates.max()}[error_on or error_band(mode)]
         return Monitor(name="gast-d", gain=float(seen), threshold=threshold_mps, freedom=0, sigma_mps=GROUND_SIGMA_MPS)
     matrix = ROUNDED_EQ_17 if rounded else combination_matrix(L1, L5)
-    means, covariance, freedom = matrix @ direction, PRINTED_COVARIANCE, 4
+    means, covariance, freedom = matrix @ direction, PRINTED_COVARIANCE / receivers, 4
     if name == "gast-f-sound":
-        places = np.ix_(INDEPENDENT, INDEPENDENT)
-        means, covariance, freedom = means[list(INDEPENDENT)], PRINTED_COVARIANCE[places], 3
+        means, covariance, freedom = means[list(INDEPENDENT)], _sound_covariance(receivers), 3
     delta = float(means @ np.linalg.pinv(covariance) @ means)
     form: Literal["paper", "sound"] = "paper" if freedom == 4 else "sound"
     limit = float(np.sqrt(threshold(form, P_FALSE_ALARM)))
@@ -98,6 +102,12 @@ def monitor_for(
         name="gast-f-paper" if freedom == 4 else "gast-f-sound",
         gain=float(np.sqrt(max(delta, 0.0))), threshold=limit, freedom=freedom,
     )  # fmt: skip
+
+
+def _sound_covariance(receivers: int) -> FloatArray:
+    """Of the mean over receivers, with a known receiver clock, as the station has it [(m/s)^2]."""
+    one = np.ones(1)
+    return np.asarray(StatisticCovariance().at(one, receivers * one, np.inf * one)[0])
 
 
 def direction_of(mode: str) -> FloatArray:

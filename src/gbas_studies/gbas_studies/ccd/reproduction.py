@@ -2,7 +2,16 @@
 
 from __future__ import annotations
 
-from gbas_studies.ccd import beyond, empirical, figures, tables
+from gbas_studies.ccd import (
+    availability,
+    beyond,
+    compliance_items,
+    empirical,
+    figures,
+    station_items,
+    structure,
+    tables,
+)
 from gbas_studies.reproduction.items import Reproduction
 from gbas_studies.reproduction.registry import Options
 
@@ -17,7 +26,7 @@ def reproduce(options: Options) -> Reproduction:
     options.progress("tables")
     sections = [
         tables.thresholds(),
-        tables.algebra(),
+        structure.algebra(),
         *empirical.sections(options),
         figures.figure_5_and_6(),
         tables.table_3(),
@@ -27,6 +36,9 @@ def reproduce(options: Options) -> Reproduction:
         tables.critical_mappings(),
         tables.table_5(),
         tables.table_6(),
+        compliance_items.section(),
+        *station_items.sections(),
+        availability.section(quick=options.quick),
         beyond.rare_events(options),
         *beyond.simulated(options),
     ]

@@ -59,15 +59,26 @@ class Smoothing:
     delay_s : float
         Delay to incorporation: the range is used when the air filter has so many seconds of samples, the first
         included (50 s are 100 samples, 99 updates) [s].
+    ground_age_s : float
+        t_g: time from the ground filter's start to the fault's onset; infinite: it has settled [s].
+    ground_settle_s : float
+        Time from the ground filter's start until the station lets the range be used; the paper has none [s].
     """
 
     interval_s: float = 0.5
     tau_s: float = 30.0
     start: Start = "variant"
     delay_s: float = 50.0
+    ground_age_s: float = float("inf")
+    ground_settle_s: float = 0.0
 
     def __post_init__(self) -> None:
         start_of(self.start)
+        for name in ("ground_age_s", "ground_settle_s"):
+            if not getattr(self, name) >= 0.0:
+                raise StudyError(f"{name} is {getattr(self, name)}: it must be at least 0 s")
+        if not np.isfinite(self.ground_settle_s):
+            raise StudyError("ground_settle_s is not finite: the range would never be used")
         for name in ("interval_s", "tau_s", "delay_s"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0.0):
@@ -79,6 +90,16 @@ class Smoothing:
     def alpha(self) -> float:
         """T / tau [-]."""
         return self.interval_s / self.tau_s
+
+    @property
+    def ground_start(self) -> int:
+        """Start of the ground filter in samples from the onset."""
+        return -round(min(self.ground_age_s / self.interval_s, -LONG_BEFORE))
+
+    @property
+    def released(self) -> int:
+        """First sample at which the station lets the range be used."""
+        return self.ground_start + round(self.ground_settle_s / self.interval_s)
 
     @property
     def updates(self) -> int:
@@ -123,7 +144,7 @@ def smoothed_cmc_s(start: ArrayLike, sample: ArrayLike, smoothing: Smoothing) ->
 
 
 def unit_error_s(
-    air_start: ArrayLike, smoothing: Smoothing, *, ground_start: int = LONG_BEFORE, later: ArrayLike = 0
+    air_start: ArrayLike, smoothing: Smoothing, *, ground_start: int | None = None, later: ArrayLike = 0
 ) -> FloatArray:
     """Differential error, air less ground, over the rate of code minus carrier, when the air first uses the range.
 
@@ -133,17 +154,43 @@ def unit_error_s(
         Start of the air filter in samples from the onset, ``(t_a - t_f) / T``.
     smoothing : Smoothing
     ground_start : int
-        The same of the ground filter; settled when not given.
+        The same of the ground filter; as in `smoothing` when not given.
     later : array of int
         Samples after the first use.
 
     Returns
     -------
     array
-        [s].
+        [s]; NaN before the ground filter's start.
     """
     sample = evaluation_sample(air_start, smoothing) + np.asarray(later)
-    return smoothed_cmc_s(air_start, sample, smoothing) - smoothed_cmc_s(ground_start, sample, smoothing)
+    ground = smoothing.ground_start if ground_start is None else ground_start
+    return smoothed_cmc_s(air_start, sample, smoothing) - smoothed_cmc_s(ground, sample, smoothing)
+
+
+def largest_error_s(since_s: ArrayLike, smoothing: Smoothing, *, oldest_s: float = 600.0) -> FloatArray:
+    """Largest differential error over the rate of code minus carrier, over all users, at times since the onset.
+
+    Parameters
+    ----------
+    since_s : (n,) array
+        Whole intervals of the filters [s].
+    smoothing : Smoothing
+    oldest_s : float
+        Users whose filter started up to so long before the onset, and at least the delay to incorporation ago [s].
+
+    Returns
+    -------
+    (n,) array
+        Metres for 1 m/s, so seconds; 0 where nobody uses the range.
+    """
+    sample = np.rint(np.asarray(since_s, dtype=np.float64) / smoothing.interval_s)
+    start = np.arange(-round(oldest_s / smoothing.interval_s), sample.max() - smoothing.updates + 1.0)
+    ground = smoothed_cmc_s(smoothing.ground_start, sample, smoothing)
+    error = np.abs(smoothed_cmc_s(start[:, np.newaxis], sample, smoothing) - ground)
+    used = (start[:, np.newaxis] <= sample - smoothing.updates) & (sample >= smoothing.released)
+    error = np.where(used, error, 0.0)
+    return np.asarray(error.max(axis=0, initial=0.0))
 
 
 def evaluation_sample(air_start: ArrayLike, smoothing: Smoothing) -> FloatArray:

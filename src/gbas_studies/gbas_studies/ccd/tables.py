@@ -1,4 +1,4 @@
-"""Thresholds, algebra and tables 3 to 6 of the paper as reproduced items."""
+"""Thresholds, steady states and tables 3 to 6 of the paper as reproduced items."""
 
 from __future__ import annotations
 
@@ -8,18 +8,13 @@ from typing import Final
 import numpy as np
 from scipy.special import ndtr
 
-from gbas_core.combinations import combination_matrix, iono_free_weights
 from gbas_core.divergence import (
     AIRBORNE_SIGMA_MPS,
     AIRBORNE_THRESHOLD_MPS,
     GROUND_SIGMA_MPS,
     GROUND_THRESHOLD_MPS,
     ramp_response,
-    white_noise_gain,
-    white_rate_gain,
 )
-from gbas_core.signals import L1, L5
-from gbas_ground.monitors.divergence_covariance import PRINTED_COVARIANCE
 from gbas_ground.monitors.two_frequency_divergence import threshold
 from gbas_studies.ccd.missed_detection import (
     FREE_M,
@@ -72,13 +67,14 @@ def thresholds() -> Section:
         Value(
             name="GAST F threshold, four statistics", paper="47.8795", ours=threshold("paper", P_FALSE_ALARM), unit="-",
             definition="Quantile of chi-square with 4 degrees of freedom for 1e-9; dimensionless, not (m/s)².",
+            kind="input",
         ),
         Value(
             name="GAST F threshold, three statistics", ours=threshold("sound", P_FALSE_ALARM), unit="-",
             definition="The same with 3 degrees of freedom, for the statistics that are independent.",
         ),
         Value(
-            name="GAST D threshold for 1e-9", paper="0.0233", ours=needed, unit="m/s",
+            name="GAST D threshold for 1e-9", paper="0.0233", ours=needed, unit="m/s", kind="input",
             definition=f"One-sided Gaussian quantile of 1e-9 times sigma {GROUND_SIGMA_MPS} m/s.",
             why=f"0.0233 m/s is {GROUND_THRESHOLD_MPS / GROUND_SIGMA_MPS:.3f} sigma, a probability of {actual:.2g} on "
             f"one side; 1e-9 on both sides takes {one_sided_threshold_mps(p_false_alarm=0.5e-9):.5f} m/s. The monitor "
@@ -103,7 +99,7 @@ def _steady_states() -> list[Item]:
     expected = {"code": 1.0, "carrier": 0.0, "code and carrier": 1.0}
     return [
         Value(
-            name="Eq (6), steady state of F2 over d", paper="1", unit="-",
+            name="Eq (6), steady state of F2 over d", paper="1", unit="-", kind="coefficient",
             ours=float(ramp_response(np.array([long]), alpha)[0]),
             definition="Closed form of the discrete filters after 10 000 s.",
         ),
@@ -117,99 +113,6 @@ def _steady_states() -> list[Item]:
             ours_text=", ".join(f"{rates[name]:.6f}" for name in expected),
             holds=all(abs(rates[name] - expected[name]) < 1e-9 for name in expected),
         ),
-        Claim(
-            name="Noise after the filters, eq (7)", paper_text="σ(F2) = σ(dCMC) / 120 at 1 Hz", holds=False,
-            ours_text=f"1/{1.0 / white_rate_gain(1.0 / 30.0):.2f} for white rates, "
-            f"1/{np.sqrt(2.0) / white_noise_gain(1.0 / 30.0):.1f} for white ranges",
-            definition="Exact gains of the discrete filters at T = 1 s.",
-            why="α/4 = 1/120 is the ratio of variances, so 1/11 of the standard deviations, and of a white rate. The "
-            "rate of white measurement noise is blue, and the filters reduce it more. Sigmas have to come from data.",
-        ),
-    ]  # fmt: skip
-
-
-# Coefficients of eq (16) as printed on the variances of (rho1, rho5, phi1, phi5); "" where there is none. The entries
-# with 1/n are those of a known clock.
-_EQ_16: Final[dict[tuple[int, int], tuple[str, str, str, str]]] = {
-    (0, 0): ("2", "", "24.9", "12.8"),
-    (1, 1): ("", "2", "41.0", "24.9"),
-    (2, 2): ("10.2", "3.2", "10.2", "3.2"),
-    (3, 3): ("10.2", "3.2", "", ""),
-    (0, 1): ("", "", "32", "17.9"),
-    (0, 2): ("4.52", "", "15.9", "6.4"),
-    (0, 3): ("", "", "-15.9", "-6.4"),
-    (1, 2): ("", "-2.5", "20.5", "8.9"),
-    (1, 3): ("", "", "-20.5", "-8.9"),
-    (2, 3): ("-2.26", "", "", "-3.2"),
-}
-_MEASUREMENTS: Final = ("code L1", "code L5", "carrier L1", "carrier L5")
-_MISPRINTS: Final = {
-    (3, 3): "Misprint: the carrier statistic has no code in it; its own carriers stand where the codes are printed, "
-    "10.2 and 3.2 times (1 + 1/n).",
-    (2, 3): "Misprint: the product has the carriers of both bands, -10.22 and -3.18, and no code.",
-}
-
-
-def algebra() -> Section:
-    """Rank of the statistics, eq (16) and eq (18)."""
-    matrix = combination_matrix(L1, L5)
-    near, far = iono_free_weights(L1, L5)
-    misfit = float(np.abs(matrix[2] - near * matrix[0] - far * matrix[1]).max())
-    eigenvalue = float(np.linalg.eigvalsh(PRINTED_COVARIANCE)[0])
-    ghost = float(np.abs(matrix @ np.array([1.0, (154 / 115) ** 2, -1.0, -((154 / 115) ** 2)])).max())
-    items: list[Item] = [
-        Claim(
-            name="Four statistics, 4 degrees of freedom", paper_text="4 independent statistics", holds=misfit > 1e-9,
-            ours_text="rank 3", definition="Combination matrix with exact coefficients.",
-            why="CMC_IF = 2.2606 CMC_DF1 - 1.2606 CMC_DF5 exactly. The sound form of the monitor has three statistics.",
-        ),
-        Claim(
-            name="Zero means only without fault", paper_text="means are zero only if all four rates are",
-            holds=ghost > 1e-9, ours_text="(1, γ, -1, -γ) has zero means",
-            definition="Combination matrix times code and carrier rates.",
-            why="That fault looks like an ionosphere, and is invisible on purpose.",
-        ),
-        Value(
-            name="Smallest eigenvalue of Q, eq (18)", ours=eigenvalue, unit="(m/s)²",
-            definition="Of the printed matrix. It is negative: Q has no Cholesky factor, and eq (15) no meaning there.",
-        ),
-        *_coefficients(matrix),
-        *_diagonal(),
-    ]  # fmt: skip
-    return Section(
-        title="Structure of the GAST F statistics, eq (15) to (18)", items=items,
-        text="Ours are exact coefficients; the paper rounds 3.5212, 2.5212 and 4.5212 to 3.53, 2.53 and 4.53 before it "
-        "multiplies, which hides the singularity.",
-    )  # fmt: skip
-
-
-def _coefficients(matrix: np.ndarray) -> list[Item]:
-    items: list[Item] = []
-    for (row, column), printed in _EQ_16.items():
-        for place, text in enumerate(printed):
-            ours = float(2.0 * matrix[row, place] * matrix[column, place])
-            if not text and abs(ours) < 1e-12:
-                continue
-            misprint = _MISPRINTS.get((row, column), "")
-            items.append(
-                Value(
-                    name=f"Eq (16), Q({row + 1},{column + 1}), {_MEASUREMENTS[place]}", paper=text or "0", ours=ours,
-                    unit="α/4T² σ²", tolerance=0.2 if not misprint else None,
-                    definition="Twice the product of the two statistics' coefficients.",
-                    why=misprint or "The paper multiplies rounded factors.",
-                )
-            )  # fmt: skip
-    return items
-
-
-def _diagonal() -> list[Item]:
-    printed = {"DF1": "0.0012", "DF5": "0.0012", "IF code": "0.0031", "IF carrier": "0.00085"}
-    return [
-        Value(
-            name=f"Eq (18) against table 2, {name}", paper=text, ours=float(np.sqrt(PRINTED_COVARIANCE[place, place])),
-            unit="m/s", definition="Root of the printed matrix's diagonal; table 2 gives it in m, which should be m/s.",
-        )
-        for place, (name, text) in enumerate(printed.items())
     ]  # fmt: skip
 
 

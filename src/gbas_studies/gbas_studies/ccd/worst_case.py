@@ -120,11 +120,13 @@ def response(
         From the statistic's passing of its threshold to the satellite's exclusion at the user; the paper has none [s].
     """
     rate = cmc_rate(mode, error_on or error_band(mode))
-    sample = evaluation_sample(offsets, smoothing) - round(exclusion_delay_s / smoothing.interval_s)
-    seen = ramp_response(sample, smoothing.interval_s / TAU_S)
+    sample = evaluation_sample(offsets, smoothing)
+    seen = ramp_response(sample - round(exclusion_delay_s / smoothing.interval_s), smoothing.interval_s / TAU_S)
+    # A range that the station does not release yet makes no error.
+    error_s = np.where(sample >= smoothing.released, np.abs(rate * unit_error_s(offsets, smoothing)), 0.0)
     return Response(
         offset_s=offsets * smoothing.interval_s,
-        error_s=np.abs(rate * unit_error_s(offsets, smoothing)),
+        error_s=error_s,
         statistic=monitor.gain * seen,
         monitor=monitor,
     )
@@ -185,7 +187,7 @@ def _at(values: FloatArray, rates_mps: FloatArray, found: Response, place: int) 
 
 def study(
     mode: str, monitor: str, smoothing: Smoothing, grid: Grid, *, error_on: ErrorOn | None = None,
-    exclusion_delay_s: float = 0.0,
+    exclusion_delay_s: float = 0.0, receivers: int = 1,
 ) -> tuple[Worst, Worst, Response]:  # fmt: skip
     """Worst undetected error and smallest mapping of one mode on a grid, and the responses behind them.
 
@@ -194,7 +196,7 @@ def study(
     StudyError
         For an unknown mode or monitor, and a grid that does not fit the samples.
     """
-    watched = monitor_for(monitor, mode, error_on=error_on)
+    watched = monitor_for(monitor, mode, error_on=error_on, receivers=receivers)
     found = response(
         mode, watched, smoothing, grid.offsets(smoothing.interval_s), error_on=error_on,
         exclusion_delay_s=exclusion_delay_s,

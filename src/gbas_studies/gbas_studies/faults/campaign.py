@@ -34,6 +34,7 @@ from gbas_sim.world import WorldParams
 from gbas_studies.ccd.monitors import cmc_rate
 from gbas_studies.ccd.smoothed_error import Smoothing, StudyError
 from gbas_studies.faults.exposure import TIME_TO_ALERT_S, divergence_limit_s, extrapolation_limit_s
+from gbas_studies.faults.front_exposure import SITE_RADIUS_M, front_limit
 from gbas_studies.faults.injection import Reaction, Settled, Threat, inject, settle
 
 QUIET_S: Final = 260.0
@@ -43,8 +44,6 @@ WORLD_S: Final = QUIET_S + WATCH_S + 10.0
 """A world long enough for every case [s]."""
 RECEIVER: Final = "rr2"
 """The reference receiver that has the receivers' faults."""
-
-_SITE_RADIUS_M: Final = 450.0  # reference receivers are within this of the reference point
 
 MakeThreats = Callable[[str, float], tuple[Threat, ...]]
 """Threats of a case from the satellite and the onset [s]."""
@@ -61,8 +60,8 @@ class Case:
     threats : callable
         From satellite and onset to what happens.
     limit_s : float
-        When the worst user's differential error passes its limit if nobody acts, since the onset; infinite if never
-        [s].
+        When the worst user's differential error passes its limit if nobody acts, since the onset; negative: the
+        user has the fault before the station; infinite if never [s].
     watch_s : float
         How long to look [s].
     subject : str
@@ -254,15 +253,19 @@ def front_cases(
     *,
     speed_mps: float = 100.0,
     direction_rad: float = 4.62,
+    smoothing: Smoothing | None = None,
 ) -> Iterator[Case]:
-    """Fronts over the station, each for one satellite; the limit is passed when the slope covers all receivers."""
-    crossing_s = 2.0 * _SITE_RADIUS_M / speed_mps
+    """Fronts over the station, each for one satellite, along the approach: they overtake the worst aircraft first.
+
+    Limits count from the touch of the first antenna, and are negative where the aircraft is beyond its own before.
+    """
+    filters = smoothing or Smoothing()
     for gradient in gradients:
         yield Case(
             kind="front",
             name=f"front, {1e6 * gradient:g} mm/km at {speed_mps:g} m/s",
             threats=partial(_front, gradient, speed_mps, direction_rad),
-            limit_s=crossing_s,
+            limit_s=front_limit(gradient, speed_mps, filters).since_touch_s,
             watch_s=60.0,
         )
 
@@ -277,7 +280,7 @@ def _front(
         edge="leading",
         direction_rad=direction_rad,
         speed_mps=speed_mps,
-        start_m=-_SITE_RADIUS_M,
+        start_m=-SITE_RADIUS_M,
         start_s=onset_s,
         satellites=(satellite,),
     )

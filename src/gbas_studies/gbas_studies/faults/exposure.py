@@ -5,7 +5,7 @@ settled, and the worst user's started whenever it hurts most, but at least the d
 code and carrier share reach the user only through the age of the corrections.
 
 Source of the limits: range-domain requirement of GAST D, ICAO Annex 10 vol. I, att. D: a ranging source malfunction of
-more than 1.6 m must not stay undetected (known); the ionosphere's 2.75 m at the threshold (known).
+more than 1.6 m must not stay undetected (known). Of fronts: :mod:`~.front_exposure`.
 """
 
 from __future__ import annotations
@@ -15,41 +15,14 @@ from typing import Final
 
 import numpy as np
 
-from gbas_core.record import FloatArray
-from gbas_studies.ccd.smoothed_error import LONG_BEFORE, Smoothing, smoothed_cmc_s
+from gbas_studies.ccd.smoothed_error import Smoothing, largest_error_s
 
 MALFUNCTION_LIMIT_M: Final = 1.6
-IONOSPHERE_LIMIT_M: Final = 2.75
 CORRECTION_AGE_S: Final = 1.5
 """Oldest correction a user extrapolates while nothing is lost: 0.5 s from Z-count to burst, two frames. Ours."""
 TIME_TO_ALERT_S: Final = 1.5
 """Of the ground station, GAST D (known)."""
 _SEARCH_S: Final = 600.0
-
-
-def divergence_error_s(since_s: FloatArray, smoothing: Smoothing) -> FloatArray:
-    """Largest differential error over the rate of code minus carrier, over all users, at times since the onset [s].
-
-    Parameters
-    ----------
-    since_s : (n,) array
-        Whole intervals of the filters [s].
-    smoothing : Smoothing
-
-    Returns
-    -------
-    (n,) array
-        Metres for 1 m/s.
-
-    Source: ENC 2015, eq (19) to (22), in closed form (:mod:`gbas_studies.ccd.smoothed_error`).
-    """
-    sample = np.rint(np.asarray(since_s) / smoothing.interval_s)
-    oldest = -round(_SEARCH_S / smoothing.interval_s)
-    start = np.arange(oldest, sample.max() - smoothing.updates + 1.0)
-    ground = smoothed_cmc_s(LONG_BEFORE, sample, smoothing)
-    error = np.abs(smoothed_cmc_s(start[:, np.newaxis], sample, smoothing) - ground)
-    error = np.where(start[:, np.newaxis] <= sample - smoothing.updates, error, 0.0)
-    return np.asarray(error.max(axis=0, initial=0.0))
 
 
 def divergence_limit_s(
@@ -67,7 +40,7 @@ def divergence_limit_s(
         How long to look [s].
     """
     since_s = np.arange(0.0, watch_s, smoothing.interval_s)
-    beyond = np.abs(rate_mps) * divergence_error_s(since_s, smoothing) > limit_m
+    beyond = np.abs(rate_mps) * largest_error_s(since_s, smoothing) > limit_m
     return float(since_s[beyond.argmax()]) if beyond.any() else math.inf
 
 
@@ -95,27 +68,3 @@ def extrapolation_limit_s(
         return float(since[beyond.argmax()])
     lasting = 0.5 * acceleration_mps2 * (CORRECTION_AGE_S**2 + CORRECTION_AGE_S * interval_s)
     return CORRECTION_AGE_S if abs(lasting) > limit_m else math.inf
-
-
-def front_limit_s(
-    gradient: float, closing_mps: float, distance_m: float, smoothing: Smoothing, limit_m: float = IONOSPHERE_LIMIT_M
-) -> float:
-    """When a front that has begun to delay the station's ranges costs a user on approach more than the limit [s].
-
-    Parameters
-    ----------
-    gradient : float
-        Slant gradient [m/m].
-    closing_mps : float
-        Speed of the user's line of sight into the gradient [m/s].
-    distance_m : float
-        Of the user from the station [m].
-    smoothing : Smoothing
-    limit_m : float
-
-    Notes
-    -----
-    The user is on the front's slope already: ``g (x + 2 tau v)``, at once or never. With the front between user and
-    station the error is smaller.
-    """
-    return 0.0 if abs(gradient) * (distance_m + 2.0 * smoothing.tau_s * closing_mps) > limit_m else math.inf
