@@ -14,7 +14,7 @@ export GBAS_DATA := $(abspath ../shared/data)
 endif
 endif
 
-.PHONY: help setup demo test campaign lint build packages clean lock
+.PHONY: help setup demo test campaign bag lint build packages clean lock
 .DEFAULT_GOAL := help
 
 help:  ## what can be made
@@ -34,6 +34,13 @@ test: $(READY)  ## run every test but the campaigns (ARGS="-k name" to choose)
 
 campaign: $(READY)  ## run the long tests
 	@$(RUN) python -m pytest -m campaign $(ARGS)
+
+bag: $(READY)  ## record the repository's bag anew (bags/README.md says when)
+	rm -rf out/short
+	@$(RUN) gbas demo --config short_approach --out out/short
+	@$(RUN) gbas bag check out/short/bag
+	rm -rf bags/short_approach
+	cp -r out/short/bag bags/short_approach
 
 lint: $(READY)  ## ruff, and mypy --strict on the pure modules
 	@$(RUN) ruff check .

@@ -90,6 +90,8 @@ def base_record(name: str) -> Any:
             values[entry["group"]] = ()
         elif "text" in entry:
             values[entry["name"]] = "ED V"
+        elif "letters" in entry:
+            values[entry["name"]] = entry["letters"][0]
         elif "values" in entry:
             values[entry["name"]] = entry["values"][1]
         elif "length" in entry:

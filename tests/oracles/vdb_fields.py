@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import string
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -85,6 +86,10 @@ def drawn_record(
             text = draw(st.text(ALPHABET, max_size=4)).rstrip()
             values[entry["name"]] = text
             bits += text_bits(text, 4, entry["text"])
+        elif "letters" in entry:
+            letter = draw(st.sampled_from(["", *entry["letters"]]))
+            values[entry["name"]] = letter
+            bits += field_bits(f" {string.ascii_uppercase}".index(letter or " "), entry["bits"])
         elif "values" in entry:
             raw = draw(st.integers(0, len(entry["values"]) - 1))
             values[entry["name"]] = entry["values"][raw]

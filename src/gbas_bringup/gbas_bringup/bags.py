@@ -28,6 +28,8 @@ SUITE_METADATA: Final = "gbas"
 CONFIGURATION_METADATA: Final = "gbas.configuration"
 MAIN_CONFIGURATION: Final = "configuration"
 """Key of the suite's metadata: which of the configuration files starts the nodes."""
+VECTOR_METADATA: Final = "vector_instructions"
+"""Key of the suite's metadata: the processor's vector instructions, which last bits of sines depend on."""
 END_METADATA: Final = "gbas.end"
 RECOVERY_METADATA: Final = "gbas.recovery"
 _NOT_COPIED: Final = frozenset({"rosbag2", END_METADATA})

@@ -15,7 +15,7 @@ from typing import Annotated, Any
 
 import typer
 
-from gbas_bringup import __version__, cli_reproduce, cli_siting, cli_study
+from gbas_bringup import __version__, cli_reproduce, cli_siting, cli_study, cli_vdb_fas
 from gbas_bringup.cli_base import (
     GbasGroup,
     Json,
@@ -50,6 +50,7 @@ app.add_typer(vdb_app, name="vdb")
 cli_reproduce.register(app)
 cli_siting.register(app)
 cli_study.register(app)
+cli_vdb_fas.register(vdb_app)
 
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Show every line the nodes write.")]
 Speed = Annotated[str, typer.Option("--speed", help="'max', or a multiple of real time.", metavar="max|N")]
@@ -260,7 +261,9 @@ def process(
     ] = None,
     service: Annotated[str, typer.Option(metavar="C", help="Approach service type.")] = "C",
     systems: Annotated[str, typer.Option(metavar="G|E|GE", help="GPS, Galileo, or both.")] = "G",
-    fas: Annotated[Path | None, typer.Option(metavar="fas.yaml", help="Final approach; none: north heading.")] = None,
+    fas: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Final approach, YAML or an ARINC 424 path point record.")
+    ] = None,
     station: Annotated[Path | None, typer.Option(metavar="station.yaml", help="Station (default: nominal).")] = None,
     airborne: Annotated[Path | None, typer.Option(metavar="receiver.yaml", help="Airborne receiver.")] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for the results (default: out/process-N).")] = None,

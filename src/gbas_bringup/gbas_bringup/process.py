@@ -14,12 +14,14 @@ from gbas_airborne.params import AirborneParams
 from gbas_bringup.errors import ConfigError, GbasError
 from gbas_bringup.resources import config_path
 from gbas_bringup.results import Row, summarise, write_json, write_solution_csv
+from gbas_core.approach_keys import RECORD_KEY
 from gbas_core.frames import geodetic_from_ecef
 from gbas_core.recording import RecordedEpoch, Recording
 from gbas_core.rinex import NavigationFile, ObservationFile
 from gbas_ground.broadcast_claims import statements
 from gbas_ground.params import GroundParams, ground_section
 from gbas_msgs_py.events import Event, EventKind
+from gbas_msgs_py.vdb.path_point import path_points_of
 from gbas_studies.chain import AirborneOutput, Chain
 
 NOMINAL_STATION = "nominal_station.yaml"
@@ -224,11 +226,16 @@ def _event_counts(events: Sequence[Event]) -> dict[str, int]:
     return dict(sorted(counts.items()))
 
 
-def _document(path: Path) -> Any:
+def _text(path: Path) -> str:
     try:
-        return yaml.safe_load(path.read_text(encoding="utf-8"))
+        return path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(path, f"cannot be read: {error}") from None
+
+
+def _document(path: Path) -> Any:
+    try:
+        return yaml.safe_load(_text(path))
     except yaml.YAMLError as error:
         raise ConfigError(path, f"is not YAML: {error}") from None
 
@@ -302,10 +309,16 @@ def _header_positions(recording: Recording, notes: list[str]) -> tuple[tuple[flo
 
 
 def _fas(path: Path) -> Mapping[str, Any]:
+    """Keys of a final approach: of a YAML file, or of the one ARINC 424 path point record in a text file."""
+    records = [record for _, record in path_points_of(_text(path))]
+    if len(records) > 1:
+        raise ConfigError(path, f"holds {len(records)} ARINC 424 path point records; expected one")
+    if records:
+        return {RECORD_KEY: records[0]}
     document = _document(path)
     fas = document.get("fas", document) if isinstance(document, Mapping) else None
     if not isinstance(fas, Mapping):
-        raise ConfigError(path, "is no mapping of final approach fields")
+        raise ConfigError(path, "is no mapping of final approach fields, and no ARINC 424 path point record")
     return fas
 
 

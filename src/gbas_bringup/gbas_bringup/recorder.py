@@ -26,12 +26,14 @@ from gbas_bringup.bags import (
     END_METADATA,
     MAIN_CONFIGURATION,
     SUITE_METADATA,
+    VECTOR_METADATA,
     origin_of,
     simulated_column,
 )
 from gbas_bringup.capture import Capture, Taken
 from gbas_bringup.data_time import DataTime
 from gbas_bringup.definitions import definition, qos_record
+from gbas_bringup.environment import vector_instructions
 from gbas_bringup.errors import ConfigError
 from gbas_bringup.mcap_log import CHUNK_BYTES, FLUSH_PERIOD_S, BagWriter, Topic
 from gbas_bringup.topic_names import contract_name, is_observation
@@ -115,6 +117,7 @@ def suite_metadata(command: str, config_files: Sequence[str]) -> dict[str, dict[
         "created": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         "command": command,
         "python": platform.python_version(),
+        VECTOR_METADATA: vector_instructions(),
     }
     files: dict[str, str] = {}
     for path in map(Path, config_files):

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from gbas_core.approach import FinalApproach
+from gbas_core.arinc424 import approach_values
 
 _ANGLES: Final = {
     "ltp_latitude_deg": "ltp_lat_rad",
@@ -23,6 +24,9 @@ _TEXTS: Final = ("airport_id", "runway", "route", "rpi")
 _NUMBERS: Final = ("apd", "rpds")
 _BY_COURSE: Final = {"course_deg", "fpap_distance_m"}
 _BY_FPAP: Final = {"delta_fpap_latitude_deg", "delta_fpap_longitude_deg"}
+RECORD_KEY: Final = "arinc424"
+"""Key of a path point record, in place of the fields of an approach."""
+_BESIDE_RECORD: Final = ("apd", "rpds", "rpi", "fasval_m", "faslal_m")
 _REQUIRED: Final = ("ltp_latitude_deg", "ltp_longitude_deg", "ltp_height_m", "tch_m", "gpa_deg", "fasval_m", "faslal_m")
 
 
@@ -37,12 +41,18 @@ def approach_from_mapping(mapping: Mapping[str, Any]) -> FinalApproach:
         ``gpa_deg``, ``fasval_m``, ``faslal_m``; and, when wanted, ``course_width_m``, ``delta_length_offset_m``,
         ``apd``, ``airport_id``, ``runway`` (``"26"``, ``"15R"``), ``route``, ``rpi``, ``rpds``.
 
+        Or ``arinc424``: a path point record, of which ``apd``, ``rpds``, ``rpi``, ``fasval_m`` and ``faslal_m`` may be
+        given otherwise (a record of an SBAS approach has no data selector, and no designator of type C). Its CRC is
+        checked by who broadcasts it (:mod:`gbas_msgs_py.vdb.path_point`).
+
     Raises
     ------
     ValueError
-        Naming a key that is unknown, missing or out of bounds.
+        Naming a key that is unknown, missing or out of bounds, or columns of a record.
     """
-    known = {*_ANGLES, *_LENGTHS, *_TEXTS, *_NUMBERS}
+    if RECORD_KEY in mapping:
+        return _of_record(mapping)
+    known = {*_ANGLES, *_LENGTHS, *_TEXTS, *_NUMBERS, RECORD_KEY}
     if unknown := sorted(set(mapping) - known):
         raise ValueError(f"unknown key {unknown[0]!r}; known are {', '.join(sorted(known))}")
     ways = (_BY_COURSE & set(mapping), _BY_FPAP & set(mapping))
@@ -57,6 +67,16 @@ def approach_from_mapping(mapping: Mapping[str, Any]) -> FinalApproach:
     arguments |= {key: _text(mapping, key) for key in _TEXTS if key in mapping}
     arguments |= {key: _whole(mapping, key) for key in _NUMBERS if key in mapping}
     return FinalApproach.from_course(**arguments) if ways[0] else FinalApproach(**arguments)
+
+
+def _of_record(mapping: Mapping[str, Any]) -> FinalApproach:
+    if fixed := sorted(set(mapping) - {RECORD_KEY} - set(_BESIDE_RECORD)):
+        raise ValueError(f"{fixed[0]} is given beside {RECORD_KEY}, where only {', '.join(_BESIDE_RECORD)} may be")
+    values: dict[str, Any] = approach_values(_text(mapping, RECORD_KEY))
+    for key in set(mapping) - {RECORD_KEY}:
+        read = _text if key in _TEXTS else _whole if key in _NUMBERS else _number
+        values[key] = read(mapping, key)
+    return FinalApproach(**values)
 
 
 def _number(mapping: Mapping[str, Any], key: str) -> float:

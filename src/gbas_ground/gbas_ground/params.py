@@ -22,7 +22,7 @@ import numpy as np
 import yaml
 
 from gbas_core.approach import FinalApproach
-from gbas_core.approach_keys import approach_from_mapping
+from gbas_core.approach_keys import RECORD_KEY, approach_from_mapping
 from gbas_core.frames import ecef_from_geodetic
 from gbas_core.record import FloatArray
 from gbas_core.satellites import SYSTEM_MASKS
@@ -42,6 +42,7 @@ from gbas_msgs_py.vdb.block import encode_body
 from gbas_msgs_py.vdb.burst import SLOT_NAMES
 from gbas_msgs_py.vdb.errors import VdbError
 from gbas_msgs_py.vdb.messages import AdditionalBlock1, AdditionalBlock3, AdditionalBlock4, FasDataSet, Type2, Type4
+from gbas_msgs_py.vdb.path_point import trusted_path_point
 from gbas_msgs_py.vdb.schedule import ScheduleParams, sources_that_fit
 
 _DEGREE: Final = math.pi / 180.0
@@ -463,6 +464,8 @@ def _approaches(flat: dict[str, Any]) -> tuple[FinalApproach, ...]:
     for name in sorted(by_name):
         try:
             approach = approach_from_mapping(by_name[name])
+            if RECORD_KEY in by_name[name]:
+                trusted_path_point(by_name[name][RECORD_KEY])
             encode_body(Type4(data_sets=(fas_data_set(approach),)))  # what cannot be broadcast is refused here
             approaches.append(approach)
         except ValueError as error:

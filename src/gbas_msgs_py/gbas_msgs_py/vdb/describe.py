@@ -25,7 +25,20 @@ from gbas_msgs_py.vdb.bits import BitArray, bits_msb_first
 from gbas_msgs_py.vdb.block import BlockError, MessageBlock, decode_blocks, encode_block, message_type_of
 from gbas_msgs_py.vdb.errors import VdbError
 from gbas_msgs_py.vdb.fec import correct_fec, encode_fec
-from gbas_msgs_py.vdb.fields import Choice, Count, Entry, Group, Layout, Number, Part, Spare, Switch, Text, Vector
+from gbas_msgs_py.vdb.fields import (
+    Choice,
+    Count,
+    Entry,
+    Group,
+    Layout,
+    Letter,
+    Number,
+    Part,
+    Spare,
+    Switch,
+    Text,
+    Vector,
+)
 from gbas_msgs_py.vdb.radio import decode_burst_bits
 
 Document = dict[str, Any]
@@ -348,7 +361,7 @@ def _value_of(entry: Entry, value: Any, where: str, document: Mapping[str, Any],
         return _number_of(entry.default, value, where)
     if isinstance(entry, Number):
         return _number_of(entry, value, where)
-    if isinstance(entry, (Choice, Text)):
+    if isinstance(entry, (Choice, Letter, Text)):
         return value
     raise AssertionError(entry)
 

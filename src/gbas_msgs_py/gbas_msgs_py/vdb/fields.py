@@ -250,6 +250,36 @@ class Choice:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Letter:
+    """One letter by its lowest five IA-5 bits (A is 1, Z is 26), or none (zero); `unused` ones are never assigned."""
+
+    name: str
+    unused: str = ""
+    bits: int = 5
+    doc: str = ""
+    unit: str = ""
+    valid_if: None = None
+
+    @cached_property
+    def _known(self) -> dict[int, str]:
+        letters = (chr(code) for code in range(ord("A"), ord("Z") + 1))
+        return {0: ""} | {ord(letter) & 0x1F: letter for letter in letters if letter not in self.unused}
+
+    def to_raw(self, value: Any) -> int:
+        """Raw code of a letter."""
+        for raw, known in self._known.items():
+            if known == value:
+                return raw
+        raise FieldError(f"{self.name} = {value!r} is not empty or one of {''.join(self._known.values())}")
+
+    def from_raw(self, raw: int) -> str:
+        """Letter of a raw code."""
+        if raw not in self._known:
+            raise FieldError(f"{self.name}: code {raw} is no letter of {''.join(self._known.values())}")
+        return self._known[raw]
+
+
+@dataclass(frozen=True, kw_only=True)
 class Text:
     """Characters A-Z, 0-9 and space by their lowest six IA-5 bits; the rightmost is sent first; padded at the right."""
 
@@ -357,7 +387,7 @@ class Part:
     layout: Layout
 
 
-Entry = Number | Choice | Text | Spare | Vector | Switch | Count | Group | Part
+Entry = Number | Choice | Letter | Text | Spare | Vector | Switch | Count | Group | Part
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -457,7 +487,7 @@ def encode(layout: Layout, record: Any, writer: BitWriter) -> None:
     for entry in layout.entries:
         if isinstance(entry, Number):
             writer.put(_number_to_raw(entry, record), entry.bits)
-        elif isinstance(entry, (Choice, Text)):
+        elif isinstance(entry, (Choice, Letter, Text)):
             writer.put(entry.to_raw(getattr(record, entry.name)), entry.bits)
         elif isinstance(entry, Spare):
             writer.put(0, entry.bits)
@@ -536,7 +566,7 @@ def _decode(layout: Layout, reader: BitReader) -> Any:
     counts: dict[str, int] = {}
     raw_of_switch: dict[int, int] = {}
     for entry in layout.entries:
-        if isinstance(entry, (Number, Choice, Text)):
+        if isinstance(entry, (Number, Choice, Letter, Text)):
             values[entry.name] = entry.from_raw(reader.take(entry.bits))
         elif isinstance(entry, Spare):
             reader.take(entry.bits)

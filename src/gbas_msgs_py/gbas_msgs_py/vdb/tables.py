@@ -10,7 +10,7 @@ import math
 from fractions import Fraction
 from typing import Final
 
-from gbas_msgs_py.vdb.fields import Choice, Count, Group, Layout, Number, Part, Spare, Switch, Text, Vector
+from gbas_msgs_py.vdb.fields import Choice, Count, Group, Layout, Letter, Number, Part, Spare, Switch, Text, Vector
 from gbas_msgs_py.vdb.messages import (
     AdditionalBlock1,
     AdditionalBlock3,
@@ -317,7 +317,7 @@ FAS_BLOCK: Final = Layout(
         Number(name="runway_number", bits=6, maximum=36, doc="0: point in space"),
         Choice(name="runway_letter", bits=2, values=("", "R", "C", "L")),
         Number(name="approach_performance_designator", bits=3, doc="0 GAST-A/B, 1 GAST-C, 2 GAST-C and D"),
-        Choice(name="route_indicator", bits=5, values=("", *"ABCDEFGHJKLMNPQRSTUVWXYZ")),
+        Letter(name="route_indicator", unused="IO"),
         Number(name="reference_path_data_selector", bits=8, maximum=48),
         Text(name="reference_path_identifier", characters=4, bits_per_character=8),
         _latitude("ltp_latitude_rad"),
