@@ -110,9 +110,7 @@ def _sigmas_m(solution: SolutionEpoch) -> dict[str, float]:
 
 def main(data: Path) -> None:
     """Print the tables."""
-    print(
-        "| recording | solved | horizontal, vertical rms | RTKLIB's | VPL median | VPL ≥ error | LPL ≥ error |"
-    )
+    print("| recording | solved | horizontal, vertical rms | RTKLIB's | VPL median | VPL ≥ error | LPL ≥ error |")
     print("|---|---|---|---|---|---|---|")
     for name in recorded_sets():
         result = process(request(name, data))

@@ -28,6 +28,7 @@ from gbas_core.record import FloatArray
 from gbas_core.satellites import SYSTEM_MASKS
 from gbas_ground.approaches import fas_data_set
 from gbas_ground.declared import REQUIRED, Declared, all_specs, arguments_from, flatten, listed, nested, parameter
+from gbas_ground.ionosphere.section import IonosphereSection
 from gbas_ground.monitor_params import MonitorParams
 from gbas_msgs_py.parameters import ParameterError, unknown_parameters
 from gbas_msgs_py.records import MAX_REFERENCE_RECEIVERS
@@ -45,6 +46,8 @@ MAX_SIGMA_VIG: Final = 25.5e-6
 """Largest vertical ionosphere gradient sigma that a type 2 message carries [m/m]."""
 MAX_DECORRELATION: Final = 1.275e-3
 """Largest ephemeris decorrelation parameter that a type 1 or type 11 message carries [m/m]."""
+MAX_SCREENED_M: Final = 60_000.0
+"""Largest distance of use that can be protected against ionospheric fronts [m]. Ours."""
 MIN_SERVICE_SATELLITES: Final = 4
 """Fewer corrections than this give nobody a position: the station then says that it is not healthy."""
 
@@ -262,6 +265,7 @@ class GroundParams(Declared):
     )
 
     monitors: MonitorParams = nested(MonitorParams())
+    ionosphere: IonosphereSection = nested(IonosphereSection())
 
     approaches: tuple[FinalApproach, ...] = ()
 
@@ -272,6 +276,7 @@ class GroundParams(Declared):
         _check_sigma_table(self)
         _check_vdb(self)
         _check_messages(self)
+        _check_ionosphere(self)
 
     @property
     def n_receivers(self) -> int:
@@ -491,3 +496,19 @@ def _check_messages(params: GroundParams) -> None:
         raise ParameterError(f"cannot be broadcast: {error}") from None
     if room < MIN_SERVICE_SATELLITES:
         raise ParameterError(f"vdb.slots = {params.slots!r} leaves room for {room} satellites; 4 are needed")
+
+
+def _check_ionosphere(params: GroundParams) -> None:
+    """Only what is screened may be claimed: approaches, out to a largest distance of use."""
+    if not params.ionosphere.protects:
+        return
+    model = f"ionosphere.threat_model = {params.ionosphere.threat_model!r}"
+    if not params.approaches:
+        raise ParameterError(f"{model} needs at least one approach to be protected")
+    if not 0.0 < params.max_use_distance_m <= MAX_SCREENED_M:
+        raise ParameterError(
+            f"{model} needs station.max_use_distance_m above 0 (not unlimited) and at most {MAX_SCREENED_M:g} m, "
+            f"not {params.max_use_distance_m:g}"
+        )
+    if params.tau_s[0] <= 0.0:
+        raise ParameterError(f"{model} needs smoothing.tau_s above 0 s")
