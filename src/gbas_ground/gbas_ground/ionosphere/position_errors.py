@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-call"
 """Position errors and protection levels of many geometries, compiled: the inner loops of the screening.
 
 The clocks are eliminated from the normal equations and the three that are left are solved in closed form.

@@ -46,7 +46,7 @@ class Sky(NamedTuple):
     elevation_rad: FloatArray
     azimuth_rad: FloatArray
     sigma_m: FloatArray
-    count: FloatArray
+    receivers: FloatArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -123,13 +123,15 @@ def protect(
         return initial_ionosphere(), Protection(sigma_vig=MAX_SIGMA_VIG, shape_m=np.zeros(N_SATS))
     before = state.protection
     renew = before is None or key - state.renewed_key >= round(1000.0 * params.ionosphere.renewal_s)
-    satellites = np.where(sent, sky.count, 0.0)
+    satellites = np.where(sent, sky.receivers, 0.0)
     if before is not None and not renew and bool((satellites == state.satellites).all()):
         return state, before
     screening = _Screening.of(sent, sky, params)
-    if renew:
-        sigma_vig = screening.least_vig(MAX_SIGMA_VIG if before is None else before.sigma_vig)
-        credited = sigma_vig if before is None else min(sigma_vig, before.sigma_vig)
+    if before is None:
+        sigma_vig = credited = screening.least_vig(MAX_SIGMA_VIG)
+    elif renew:
+        sigma_vig = screening.least_vig(before.sigma_vig)
+        credited = min(sigma_vig, before.sigma_vig)
     else:
         sigma_vig, credited = before.sigma_vig, state.credited_vig
     factor = screening.least_factor(credited, 0.0 if before is None else before.factor)
@@ -246,7 +248,7 @@ class Places:
     designator_b: BoolArray
     limit_m: FloatArray
     tolerable_m: FloatArray
-    decision: FloatArray
+    decision: NDArray[np.int64]
     radius_m: float
     credit: DivergenceCredit | None
 
@@ -358,7 +360,7 @@ def cases_of(satellites: NDArray[np.int64], sky: Sky, params: GroundParams) -> C
     sky : Sky
     params : GroundParams
     """
-    elevation, azimuth, base, count = (each[satellites] for each in sky)
+    elevation, azimuth, base, receivers = (each[satellites] for each in sky)
     section, mask, places = params.ionosphere, params.elevation_mask_rad, places_of(params)
     up = np.stack([np.cos(elevation) * np.sin(azimuth), np.cos(elevation) * np.cos(azimuth), np.sin(elevation)])
     air = np.stack([sigma_air(aad, elevation, mask_rad=mask) for aad in _DESIGNATORS])
@@ -367,7 +369,7 @@ def cases_of(satellites: NDArray[np.int64], sky: Sky, params: GroundParams) -> C
     )
     speed, slant = places.speed_mps[:, np.newaxis], places.slant_m[:, np.newaxis]
     error = range_errors_m(places, elevation, azimuth, section.threat(), params.tau_s[0])
-    fewest = int(count.min())
+    fewest = int(receivers.min())
     return Cases(
         los=places.los_axes @ up,
         tan_gpa=places.tan_gpa,

@@ -152,8 +152,8 @@ def worst_range_error_m(
 def _receding_m(threat: FrontThreat, credit: DivergenceCredit | None, tau_s: float, radius_m: float) -> FloatArray:
     """What fronts that have swept the station add to ``x + 2 v tau``, per unit of gradient [m].
 
-    Over distance, the aircraft's speed and the share of the largest gradient, ``(X, V, G)``. Of each step of the fronts'
-    speed the faster end, of each step of gradient the less steep, and of both the earlier return of the satellite.
+    Over distance, the aircraft's speed and the share of the largest gradient, ``(X, V, G)``. Of each step of speed of
+    the fronts the faster end, of each step of gradient the less steep, and of both the earlier return of the satellite.
     """
     front_mps = np.geomspace(0.5, threat.max_speed_mps, _FRONT_SPEEDS)
     shares = np.concatenate([_SHARES[:1] / 1.1, _SHARES])[:, np.newaxis]

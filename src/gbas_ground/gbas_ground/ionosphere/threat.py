@@ -60,7 +60,7 @@ class FrontThreat:
 
     def largest_gradient(self, elevation_rad: ArrayLike) -> FloatArray:
         """Largest slant gradient at elevations [m/m]; NaN stays NaN."""
-        return np.asarray(np.interp(elevation_rad, self.elevation_rad, self.gradient))
+        return np.asarray(np.interp(np.asarray(elevation_rad, dtype=np.float64), self.elevation_rad, self.gradient))
 
 
 THREATS: Final[Mapping[str, FrontThreat]] = MappingProxyType(
