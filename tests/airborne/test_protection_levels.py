@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import protection_loops
-from gbas_airborne.protection import Multipliers, h1_levels, k_ffmd, k_md, protection_levels
+from gbas_airborne.protection import Multipliers, h1_levels, protection_levels
+from gbas_core.missed_detection import k_ffmd, k_md
 from gbas_core.satellites import N_SATS, missing
 from gbas_core.wls import projection_matrix, vertical_lateral
 from gbas_msgs_py.records import SolutionEpoch

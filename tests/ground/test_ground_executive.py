@@ -61,6 +61,6 @@ def test_causes_are_words_and_latched_ones_are_told_apart():
     assert ExclusionCause.B_VALUE.word == "b_value"
     affairs = {
         "NONE", "NOT_TRACKED", "SETTLING", "BELOW_MASK", "NO_EPHEMERIS", "TOO_FEW_RECEIVERS",
-        "TOO_FEW_COMMON_SATELLITES", "SIGMA_TOO_LARGE", "NO_RATE", "UNMONITORED",
+        "TOO_FEW_COMMON_SATELLITES", "SIGMA_TOO_LARGE", "NO_RATE", "UNMONITORED", "IONOSPHERE_UNPROTECTED",
     }  # fmt: skip
     assert {cause.name for cause in ExclusionCause if cause < FIRST_LATCHED} == affairs

@@ -13,35 +13,12 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
 
+from gbas_core.missed_detection import k_ffmd, k_md
 from gbas_core.record import FloatArray
 from gbas_msgs_py.records import SolutionEpoch
 
 BoolArray = NDArray[np.bool_]
-
-
-def k_ffmd(n_receivers: int, probability: float = 2.5e-8) -> float:
-    """Fault-free missed detection multiplier, K_ffmd = Q^-1(p / (2 (M+1))).
-
-    Parameters
-    ----------
-    n_receivers : int
-        M, two or more; one receiver has a multiplier of its own (a parameter).
-    probability : float
-        p, shared equally by the fault-free and the M single receiver fault hypotheses.
-
-    Source: ICAO Annex 10 vol. I, table B-67 (5.762, 5.810, 5.847), from the probabilities behind it.
-    """
-    return float(norm.isf(0.5 * probability / (n_receivers + 1)))
-
-
-def k_md(n_receivers: int, probability: float = 2.5e-8, receiver_fault_prior: float = 1e-5) -> float:
-    """Missed detection multiplier given a faulted receiver, K_md = Q^-1((p / (M+1)) / (prior / M)).
-
-    Source: ICAO Annex 10 vol. I, table B-67 (2.935, 2.898, 2.878), from the probabilities behind it.
-    """
-    return float(norm.isf((probability / (n_receivers + 1)) / (receiver_fault_prior / n_receivers)))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from gbas_bringup import cli_study_coverage, cli_study_faults, cli_study_gradient
+from gbas_bringup import cli_study_coverage, cli_study_faults, cli_study_fronts, cli_study_gradient
 from gbas_bringup.cli_base import Json, print_json
 
 study_app = typer.Typer(help="Sweeps and campaigns beyond the published ones.", no_args_is_help=True)
@@ -16,6 +16,7 @@ def register(app: typer.Typer) -> None:
     """Add the commands."""
     cli_study_coverage.register(study_app)
     cli_study_faults.register(study_app)
+    cli_study_fronts.register(study_app)
     cli_study_gradient.register(study_app)
     app.add_typer(study_app, name="study")
 

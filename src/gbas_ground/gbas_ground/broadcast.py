@@ -132,6 +132,13 @@ def broadcast_frame(
     return BroadcastState(schedule=scheduled, key=key), bursts
 
 
+def highest_sent(usable: BoolArray, elevation_rad: FloatArray, params: GroundParams) -> BoolArray:
+    """Of satellites that are usable those that the slots hold, ``(N,)``."""
+    sent = np.zeros(usable.shape, dtype=bool)
+    sent[list(_highest(usable, elevation_rad, _constants(params)[3]))] = True
+    return sent
+
+
 def _highest(usable: BoolArray, elevation_rad: FloatArray, room: int) -> tuple[int, ...]:
     """The satellites to send, in their order on the axis."""
     satellites = np.flatnonzero(usable)

@@ -32,6 +32,8 @@ class ExclusionCause(IntEnum):
     """No previous epoch to form a range rate correction with."""
     UNMONITORED = 9
     """A required monitor cannot judge it, or not yet."""
+    IONOSPHERE_UNPROTECTED = 10
+    """No inflation of the sigmas protects its users against an ionospheric front of the threat model."""
     B_VALUE = 32
     """A B value above its threshold (multiple reference consistency check)."""
     RECEIVER_FAULT = 33

@@ -13,6 +13,7 @@ from gbas_ground.causes import FIRST_LATCHED, ExclusionCause
 from gbas_ground.consistency import Corrections, Exclusions, Measured
 from gbas_ground.corrections import BoolArray
 from gbas_ground.ephemerides import EphemerisState
+from gbas_ground.ionosphere.protection import Protection
 from gbas_ground.orbit_claim import claimed_decorrelation
 from gbas_ground.params import GroundParams
 from gbas_ground.sigma import MAX_SIGMA_M
@@ -91,6 +92,15 @@ def _sigma_fits(made: Corrections) -> BoolArray:
     return np.asarray(((sigmas > 0.0) & (sigmas <= MAX_SIGMA_M)).all(axis=0))
 
 
+def withheld(condition: Condition) -> Condition:
+    """The condition when no usable satellite may be used for want of protection against ionospheric fronts."""
+    usable = condition.state == ChannelState.USABLE
+    return Condition(
+        state=np.where(usable, float(ChannelState.EXCLUDED), condition.state),
+        cause=np.where(usable, float(ExclusionCause.IONOSPHERE_UNPROTECTED), condition.cause),
+    )
+
+
 def integrity_of(
     gps_week: int,
     tow_s: float,
@@ -99,6 +109,7 @@ def integrity_of(
     made: Corrections,
     condition: Condition,
     orbit_bound: FloatArray,
+    protection: Protection,
     params: GroundParams,
 ) -> IntegrityEpoch:
     """The record of an epoch: a row for every satellite in view, corrections where they are usable.
@@ -123,7 +134,7 @@ def integrity_of(
         gps_week=gps_week,
         tow_s=tow_s,
         n_receivers=float((made.used & usable).any(axis=1).sum()),
-        sigma_vert_iono_gradient=params.sigma_vert_iono_gradient,
+        sigma_vert_iono_gradient=protection.sigma_vig,
         state=of_row(condition.state),
         cause=of_row(condition.cause),
         elevation_rad=of_row(measured.elevation_rad),
@@ -137,7 +148,7 @@ def integrity_of(
         rrc_100_mps=of_usable(made.rrc_mps[0]),
         prc_30_m=of_usable(made.prc_m[1]),
         rrc_30_mps=of_usable(made.rrc_mps[1]),
-        sigma_pr_gnd_m=of_usable(made.sigmas.gnd_m),
+        sigma_pr_gnd_m=of_usable(protection.inflated_m(made.sigmas.gnd_m)),
         sigma_pr_gnd_d_m=of_usable(made.sigmas.gnd_d_m),
         sigma_pr_gnd_30_m=of_usable(made.sigmas.gnd_30_m),
         b_m=b,

@@ -30,6 +30,7 @@ from gbas_ground.approaches import fas_data_set
 from gbas_ground.declared import REQUIRED, Declared, all_specs, arguments_from, flatten, listed, nested, parameter
 from gbas_ground.gradient_claim import MAX_M_EIG, MAX_Y_EIG_M, GradientClaim, gradient_claim
 from gbas_ground.gradient_claim import refuse_smaller as refuse_smaller_gradient
+from gbas_ground.ionosphere.section import IonosphereSection
 from gbas_ground.monitor_params import MonitorParams
 from gbas_ground.monitors.double_difference import baselines_of
 from gbas_ground.monitors.ephemeris_residual import EphemerisResidualParams
@@ -53,6 +54,8 @@ TYPE_D_GCID: Final = (2, 3, 4)
 RSDS_NONE: Final = 255
 MAX_SIGMA_VIG: Final = 25.5e-6
 """Largest vertical ionosphere gradient sigma that a type 2 message carries [m/m]."""
+MAX_SCREENED_M: Final = 60_000.0
+"""Largest distance of use that can be protected against ionospheric fronts [m]. Ours."""
 MIN_SERVICE_SATELLITES: Final = 4
 """Fewer corrections than this give nobody a position: the station then says that it is not healthy."""
 
@@ -279,6 +282,7 @@ class GroundParams(Declared):
     )
 
     monitors: MonitorParams = nested(MonitorParams())
+    ionosphere: IonosphereSection = nested(IonosphereSection())
 
     approaches: tuple[FinalApproach, ...] = ()
 
@@ -291,6 +295,7 @@ class GroundParams(Declared):
         _check_messages(self)
         _check_orbit_claim(self)
         _check_gradient_claim(self)
+        _check_ionosphere(self)
 
     @property
     def n_receivers(self) -> int:
@@ -575,3 +580,19 @@ def _check_gradient_claim(params: GroundParams) -> None:
         refuse_smaller_gradient(params.y_eig_m, params.m_eig, params.gradient_claim())
     except ValueError as error:
         raise ParameterError(str(error)) from None
+
+
+def _check_ionosphere(params: GroundParams) -> None:
+    """Only what is screened may be claimed: approaches, out to a largest distance of use."""
+    if not params.ionosphere.protects:
+        return
+    model = f"ionosphere.threat_model = {params.ionosphere.threat_model!r}"
+    if not params.approaches:
+        raise ParameterError(f"{model} needs at least one approach to be protected")
+    if not 0.0 < params.max_use_distance_m <= MAX_SCREENED_M:
+        raise ParameterError(
+            f"{model} needs station.max_use_distance_m above 0 (not unlimited) and at most {MAX_SCREENED_M:g} m, "
+            f"not {params.max_use_distance_m:g}"
+        )
+    if params.tau_s[0] <= 0.0:
+        raise ParameterError(f"{model} needs smoothing.tau_s above 0 s")

@@ -21,11 +21,12 @@ from gbas_ground.broadcast import (
     BroadcastState,
     broadcast_frame,
     empty_integrity,
+    highest_sent,
     refused_in_a_row,
 )
 from gbas_ground.causes import ExclusionCause
 from gbas_ground.channels import channel_epoch
-from gbas_ground.condition import Condition, conclude, integrity_of
+from gbas_ground.condition import Condition, conclude, integrity_of, withheld
 from gbas_ground.consistency import (
     Corrections,
     Exclusions,
@@ -41,6 +42,14 @@ from gbas_ground.ephemerides import EphemerisState, initial_ephemerides
 from gbas_ground.event_log import EventLog
 from gbas_ground.executive import advance, exclude, release
 from gbas_ground.geometry import Expected, Site, expected, site_of
+from gbas_ground.ionosphere.protection import (
+    IonosphereState,
+    Protection,
+    Sky,
+    changes,
+    initial_ionosphere,
+    protect,
+)
 from gbas_ground.long_term import initial_long_term, watch_sigmas
 from gbas_ground.looks import look, monitor_epoch
 from gbas_ground.monitors.expected_range import check_expected_range
@@ -149,6 +158,8 @@ class MonitorState:
         Monitors of signals.
     long_term : SigmaMonitorState
         Monitor of B values over time.
+    ionosphere : IonosphereState
+        Protection against ionospheric fronts.
     """
 
     key: int | None
@@ -166,6 +177,7 @@ class MonitorState:
     channels: ChannelEpoch | None
     watching: WatchState
     long_term: SigmaMonitorState
+    ionosphere: IonosphereState
 
 
 def initial_monitor_state(params: GroundParams) -> MonitorState:
@@ -186,6 +198,7 @@ def initial_monitor_state(params: GroundParams) -> MonitorState:
         channels=None,
         watching=initial_watch(params),
         long_term=initial_long_term(params),
+        ionosphere=initial_ionosphere(),
     )
 
 
@@ -314,7 +327,10 @@ def _process(
     new_exclusions = _advanced(new_exclusions, measured, made, followed.channel_ok, watched.passed, dt_s, params)
 
     condition = conclude(followed.tracked, followed.tracks, known, measured, made, new_exclusions, params)
-    integrity = integrity_of(epoch.gps_week, epoch.tow_s, known, measured, made, condition, watched.orbit_bound, params)
+    ionosphere, protection, condition = _protect(state, key, condition, made, followed.should, params, events)
+    integrity = integrity_of(
+        epoch.gps_week, epoch.tow_s, known, measured, made, condition, watched.orbit_bound, protection, params
+    )
     channels = channel_epoch(
         epoch.gps_week,
         epoch.tow_s,
@@ -346,6 +362,7 @@ def _process(
         channels=channels,
         watching=watching,
         long_term=long_term,
+        ionosphere=ionosphere,
     )
     checks = zip(("range", "power"), followed.checks, strict=True)
     looks = {name: look(result, followed.tracked) for name, (_, result) in checks}
@@ -476,6 +493,29 @@ def _measured(
         judged=watched.ready,
         elevation_rad=followed.should.elevation_rad,
     )
+
+
+def _protect(
+    state: MonitorState,
+    key: int,
+    condition: Condition,
+    made: Corrections,
+    should: Expected,
+    params: GroundParams,
+    events: EventLog,
+) -> tuple[IonosphereState, Protection, Condition]:
+    """Protection of what would be sent against ionospheric fronts; what it cannot protect is not used."""
+    if state.key is None and not params.ionosphere.protects:
+        events.add(EventKind.STATION, "station", "ionosphere_no_threat_model")
+    usable = condition.state == ChannelState.USABLE
+    sent = highest_sent(usable, should.elevation_rad, params) if params.ionosphere.protects else usable
+    sky = Sky(should.elevation_rad, should.azimuth_rad, made.sigmas.gnd_m, made.count)
+    ionosphere, protection = protect(state.ionosphere, key, sent, sky, params)
+    before = state.ionosphere.protection
+    if ionosphere.protection is not None and ionosphere.protection is not before:
+        for cause, value, threshold in changes(before, ionosphere.protection):
+            events.add(EventKind.STATION, "station", cause, value, threshold)
+    return ionosphere, protection, condition if protection.available else withheld(condition)
 
 
 def _before(epoch: GroundEpoch, followed: _Followed) -> Before:

@@ -463,6 +463,10 @@ class World:
         """Elevations ``(R, N_SATS)`` of the satellites at an epoch, the aircraft's last [rad]."""
         return self._instant(number).elevation_rad
 
+    def paths(self, number: int) -> SignalPaths:
+        """Signal paths at an epoch, the aircraft's last."""
+        return self._instant(number).paths
+
     def above_masks(self, number: int) -> NDArray[np.bool_]:
         """Satellites above the receivers' masks at an epoch, (R, N_SATS)."""
         return np.asarray(self.elevations_rad(number) >= self._masks_rad[:, np.newaxis])

@@ -11,8 +11,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from gbas_core.compiled import compiled
 from gbas_core.record import FloatArray
-from gbas_ground.siting.worst_gradient import compiled
 
 # Keeps what rounding might have cut: a part in 1e12 of a length is far less than a gap in the statistic is worth.
 _KEEP = 1.0e-12

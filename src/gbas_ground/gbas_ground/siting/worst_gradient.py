@@ -19,21 +19,13 @@ Source: Belabbas et al., Optimal linear distribution of monitors, where D is sou
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, NamedTuple, TypeVar, cast
+from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike
 
+from gbas_core.compiled import compiled
 from gbas_core.record import FloatArray
-
-_Function = TypeVar("_Function", bound=Callable[..., Any])
-
-
-def compiled(function: _Function) -> _Function:
-    """No ``fastmath``: the order of sums and the meaning of NaN stay."""
-    return cast(_Function, njit(cache=True, error_model="numpy")(function))
 
 
 class Worst(NamedTuple):

@@ -1,0 +1,15 @@
+"""Compiled functions: loops over single numbers that numpy would be slow at."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar, cast
+
+from numba import njit
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+
+def compiled(function: _Function) -> _Function:
+    """The function compiled, once a machine. No ``fastmath``: the order of sums and the meaning of NaN stay."""
+    return cast(_Function, njit(cache=True, error_model="numpy")(function))

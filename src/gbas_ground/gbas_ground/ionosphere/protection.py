@@ -1,0 +1,406 @@
+"""The station's protection against ionospheric fronts: what it inflates at an epoch, and what it remembers.
+
+The screening is made anew each minute of data time, and at once when the satellites that are sent, or the receivers
+behind them, change. sigma_vig is raised first, then sigma_pr_gnd of each satellite in proportion to what a front does
+to its range. Station data are sent every ten seconds only: sigma_vig changes with the minute, and a rise counts from
+the next minute on, when every aircraft has it; sigma_pr_gnd, sent with each correction, makes up for it meanwhile.
+When no inflation is enough, nothing is sent as usable.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gbas_core.approach import FinalApproach, alert_limits
+from gbas_core.error_models import AirborneAccuracy, sigma_air, sigma_iono_m, sigma_tropo_m
+from gbas_core.frames import rot_enu_ecef
+from gbas_core.missed_detection import K_FFMD_SINGLE, k_ffmd
+from gbas_core.record import FloatArray
+from gbas_core.satellites import N_SATS, SYSTEM_MASKS
+from gbas_ground.corrections import BoolArray
+from gbas_ground.ionosphere.geometry_screening import Cases, judge, least_safe, sent_sigma_m, subsets_of
+from gbas_ground.ionosphere.range_error import DivergenceCredit, worst_range_error_m
+from gbas_ground.ionosphere.section import IonosphereSection
+from gbas_ground.ionosphere.threat import FrontThreat
+from gbas_ground.params import MAX_SIGMA_VIG, MIN_SERVICE_SATELLITES, GroundParams
+from gbas_ground.sigma import MAX_SIGMA_M
+
+_VIG_STEP: Final = 1.0e-7  # resolution of the type 2 message
+_VIG_STEPS: Final = round(MAX_SIGMA_VIG / _VIG_STEP)
+_FACTOR_STEP: Final = 0.005  # of the range error at the decision height; some 3 cm
+_FACTOR_STEPS: Final = 200
+_DESIGNATORS: Final[tuple[AirborneAccuracy, ...]] = ("A", "B")
+_DISTANCES_M: Final = (2_000.0, 3_500.0, 5_500.0, 7_600.0, 12_000.0, 20_000.0, 32_000.0)
+
+
+class Sky(NamedTuple):
+    """The corrected satellites: elevation, azimuth [rad], ground sigma [m] and receivers behind them, ``(N,)``."""
+
+    elevation_rad: FloatArray
+    azimuth_rad: FloatArray
+    sigma_m: FloatArray
+    receivers: FloatArray
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Protection:
+    """What is inflated at an epoch.
+
+    Attributes
+    ----------
+    sigma_vig : float
+        As broadcast [m/m].
+    factor : float
+        Of the inflation of sigma_pr_gnd [-].
+    shape_m : (N,) array
+        Times `factor`, what is added to sigma_pr_gnd in quadrature; NaN for satellites that are not protected.
+    available : bool
+        False when no inflation is enough: then nothing may be used.
+    """
+
+    sigma_vig: float
+    factor: float = 0.0
+    shape_m: FloatArray
+    available: bool = True
+
+    def inflated_m(self, sigma_m: FloatArray) -> FloatArray:
+        """Broadcast sigmas, ``(N,)`` [m]."""
+        return sigma_m if self.factor == 0.0 else sent_sigma_m(sigma_m, self.shape_m, self.factor)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class IonosphereState:
+    """What is remembered between epochs.
+
+    Attributes
+    ----------
+    satellites : (N,) array
+        Receivers behind each satellite screened; 0 where it was not.
+    renewed_key : int
+        Epoch of the last renewal [ms].
+    credited_vig : float
+        sigma_vig that every aircraft has [m/m].
+    protection : Protection or None
+        None before the first screening.
+    """
+
+    satellites: FloatArray
+    renewed_key: int = 0
+    credited_vig: float = math.nan
+    protection: Protection | None = None
+
+
+def initial_ionosphere() -> IonosphereState:
+    """Nothing is screened."""
+    return IonosphereState(satellites=np.zeros(N_SATS))
+
+
+def protect(
+    state: IonosphereState, key: int, sent: BoolArray, sky: Sky, params: GroundParams
+) -> tuple[IonosphereState, Protection]:
+    """Protection of one epoch.
+
+    Parameters
+    ----------
+    state : IonosphereState
+    key : int
+        The epoch [ms since the start of GPS time].
+    sent : (N,) bool array
+        Satellites that would be broadcast.
+    sky : Sky
+    params : GroundParams
+    """
+    if not params.ionosphere.protects:
+        return state, Protection(sigma_vig=params.sigma_vert_iono_gradient, shape_m=np.zeros(N_SATS))
+    if np.count_nonzero(sent) < MIN_SERVICE_SATELLITES:  # nobody has a position; the most cautious values
+        return initial_ionosphere(), Protection(sigma_vig=MAX_SIGMA_VIG, shape_m=np.zeros(N_SATS))
+    before = state.protection
+    renew = before is None or key - state.renewed_key >= round(1000.0 * params.ionosphere.renewal_s)
+    satellites = np.where(sent, sky.receivers, 0.0)
+    if before is not None and not renew and bool((satellites == state.satellites).all()):
+        return state, before
+    screening = _Screening.of(sent, sky, params)
+    if before is None:
+        sigma_vig = credited = screening.least_vig(MAX_SIGMA_VIG)
+    elif renew:
+        sigma_vig = screening.least_vig(before.sigma_vig)
+        credited = min(sigma_vig, before.sigma_vig)
+    else:
+        sigma_vig, credited = before.sigma_vig, state.credited_vig
+    factor = screening.least_factor(credited, 0.0 if before is None else before.factor)
+    protection = Protection(
+        sigma_vig=sigma_vig,
+        factor=0.0 if factor is None else factor,
+        shape_m=screening.on_axis(),
+        available=factor is not None,
+    )
+    new = IonosphereState(
+        satellites=satellites,
+        renewed_key=key if renew else state.renewed_key,
+        credited_vig=credited,
+        protection=protection,
+    )
+    return new, protection
+
+
+def changes(before: Protection | None, now: Protection) -> Iterator[tuple[str, float, float]]:
+    """What an event says of a new protection: cause, value and its bound, for each that changed."""
+    if before is None or before.available != now.available:
+        cause = "ionosphere_protected" if now.available else "ionosphere_unprotected"
+        yield cause, now.sigma_vig, MAX_SIGMA_VIG
+    if before is None or before.sigma_vig != now.sigma_vig:
+        yield "ionosphere_sigma_vig", now.sigma_vig, MAX_SIGMA_VIG
+    if now.available and (before is None or before.factor != now.factor):
+        yield "ionosphere_sigma_pr_gnd", now.factor, _FACTOR_STEPS * _FACTOR_STEP
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Screening:
+    """One sky, ready to try inflations on."""
+
+    satellites: NDArray[np.int64]
+    cases: Cases
+    groups: BoolArray
+    subsets: BoolArray
+
+    @classmethod
+    def of(cls, sent: BoolArray, sky: Sky, params: GroundParams) -> _Screening:
+        satellites = np.flatnonzero(sent)
+        section = params.ionosphere
+        letters = [each for each in params.systems if (SYSTEM_MASKS[each] & sent).any()]
+        groups = np.array([SYSTEM_MASKS[each][satellites] for each in letters])
+        subsets = subsets_of(groups, _combinations(letters, section.aircraft_systems), section.max_missing)
+        return cls(satellites=satellites, cases=cases_of(satellites, sky, params), groups=groups, subsets=subsets)
+
+    def safe(self, sigma_vig: float, factor: float) -> bool:
+        sigma_m = sent_sigma_m(self.cases.base_m, self.cases.shape_m, factor)
+        if (sigma_m > MAX_SIGMA_M).any():
+            return False
+        return judge(self.cases, self.groups, self.subsets, sigma_vig, factor, first_only=True).not_safe == 0
+
+    def least_vig(self, start: float) -> float:
+        """Least sigma_vig that is safe without other inflation; the largest when none is."""
+        nominal = math.ceil(self.cases.nominal_vig / _VIG_STEP - 1e-6)
+        step = least_safe(
+            lambda step: self.safe((nominal + step) * _VIG_STEP, 0.0),
+            _VIG_STEPS - nominal,
+            round(start / _VIG_STEP) - nominal,
+        )
+        return MAX_SIGMA_VIG if step is None else (nominal + step) * _VIG_STEP
+
+    def least_factor(self, sigma_vig: float, start: float) -> float | None:
+        """Least inflation of sigma_pr_gnd that is safe; None when none is."""
+        step = least_safe(
+            lambda step: self.safe(sigma_vig, step * _FACTOR_STEP), _FACTOR_STEPS, round(start / _FACTOR_STEP)
+        )
+        return None if step is None else step * _FACTOR_STEP
+
+    def on_axis(self) -> FloatArray:
+        """The shape on the satellite axis."""
+        shape = np.full(N_SATS, np.nan)
+        shape[self.satellites] = self.cases.shape_m
+        return shape
+
+
+def _combinations(letters: list[str], allowed: tuple[str, ...]) -> list[tuple[int, ...]]:
+    """Constellations an aircraft may use together, as places in `letters`; those without satellites fall away."""
+    wanted = allowed or ("G", "E", "GE")
+    return sorted({found for each in wanted if (found := tuple(i for i, x in enumerate(letters) if x in each))})
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Places:
+    """Where aircraft may be, how fast and with which designator; C cases, and D decision heights of the fastest.
+
+    Attributes
+    ----------
+    los_axes : (C, 3, 3) array
+        From east, north and up to the approach frame.
+    tan_gpa, speed_mps : (C,) arrays
+    offset_m : (C, 3) array
+        From the station, east, north and up [m].
+    height_m, slant_m : (C,) arrays
+        Height above the threshold, distance from the station [m].
+    designator_b : (C,) bool array
+        Airborne accuracy designator B, else A.
+    limit_m, tolerable_m : (2, C) arrays
+        Vertical and lateral. Limits are those of the next place farther away: between the two they are not less.
+    decision : (D,) int array
+        The cases at the decision heights.
+    radius_m : float
+        Distance of the farthest antenna from the station [m].
+    credit : DivergenceCredit or None
+    """
+
+    los_axes: FloatArray
+    tan_gpa: FloatArray
+    speed_mps: FloatArray
+    offset_m: FloatArray
+    height_m: FloatArray
+    slant_m: FloatArray
+    designator_b: BoolArray
+    limit_m: FloatArray
+    tolerable_m: FloatArray
+    decision: NDArray[np.int64]
+    radius_m: float
+    credit: DivergenceCredit | None
+
+
+@lru_cache(maxsize=8)
+def places_of(params: GroundParams) -> Places:
+    """Places along every approach from the threshold to the largest distance of use."""
+    section, station = params.ionosphere, params.reference_point_m()
+    enu = rot_enu_ecef(params.latitude_rad, params.longitude_rad)
+    rows: list[tuple[Any, ...]] = []
+    for approach in params.approaches:
+        decision_m = decision_distance_m(approach, section.decision_height_m)
+        outer_m = params.max_use_distance_m + float(np.linalg.norm(approach.ltp_ecef_m - station))
+        distances = sorted({0.0, decision_m, outer_m, *(each for each in _DISTANCES_M if decision_m < each < outer_m)})
+        for distance_m, beyond_m in zip(distances, [*distances[1:], outer_m], strict=True):
+            away_m = approach.position_on_path(distance_m) - station
+            height_m = float(approach.path_height_m(distance_m))
+            limits = alert_limits(approach.fasval_m, approach.faslal_m, beyond_m, approach.path_height_m(beyond_m))
+            course, slope = approach.course_rad, math.tan(approach.gpa_rad)
+            turn = [
+                [math.sin(course), math.cos(course), 0.0],
+                [-math.cos(course), math.sin(course), 0.0],
+                [0.0, 0.0, 1.0],
+            ]
+            for speed in sorted(set(section.aircraft_speed_mps)):
+                for aad in section.aircraft_aad:
+                    shaping = distance_m == decision_m and speed == max(section.aircraft_speed_mps)
+                    rows.append(
+                        (turn, slope, speed, enu @ away_m, height_m, np.linalg.norm(away_m), aad == "B", limits,
+                         _tolerable_m(section, height_m), shaping)
+                    )  # fmt: skip
+    axes, slopes, speeds, offsets, heights, slants, b, limit, tolerable, shaping_of = (
+        np.array(each) for each in zip(*rows, strict=True)
+    )
+    return Places(
+        los_axes=axes,
+        tan_gpa=slopes,
+        speed_mps=speeds,
+        offset_m=offsets,
+        height_m=heights,
+        slant_m=slants,
+        designator_b=b,
+        limit_m=np.ascontiguousarray(limit.T),
+        tolerable_m=np.ascontiguousarray(tolerable.T),
+        decision=np.flatnonzero(shaping_of),
+        radius_m=float(np.linalg.norm(params.receiver_positions_m() - station, axis=-1).max()),
+        credit=credit_of(params),
+    )
+
+
+def _tolerable_m(section: IonosphereSection, height_m: float) -> tuple[float, float]:
+    growth_m = max(0.0, height_m - section.decision_height_m) * section.tolerable_growth
+    errors = (section.tolerable_vertical_m, section.tolerable_lateral_m)
+    vertical_m, lateral_m = (each + growth_m if each > 0.0 else 0.0 for each in errors)
+    return vertical_m, lateral_m
+
+
+def decision_distance_m(approach: FinalApproach, height_m: float) -> float:
+    """Distance to the threshold at which the path is this high above it; 0 when it is higher everywhere [m]."""
+    return max(0.0, (height_m - approach.tch_m) / math.tan(approach.gpa_rad))
+
+
+def credit_of(params: GroundParams) -> DivergenceCredit | None:
+    """What the station's divergence monitor excludes for certain; None when it excludes nothing."""
+    ccd = params.monitors.ccd
+    if not ccd.exclude:
+        return None
+    monitor = ccd.params(params.settle_time_s, params.max_gap_s)
+    return DivergenceCredit(
+        threshold_mps=monitor.threshold_mps,
+        margin_mps=params.ionosphere.k_missed_detection * monitor.sigma_mps,
+        tau_s=ccd.tau_s,
+        readmission_s=params.readmission_time_s,
+    )
+
+
+def range_errors_m(
+    places: Places, elevation_rad: FloatArray, azimuth_rad: FloatArray, threat: FrontThreat, tau_s: float
+) -> FloatArray:
+    """Largest range errors at all places, ``(C, n)`` [m].
+
+    Distance is that of the aircraft, or that of where its path to the satellite meets the station's plane: descending,
+    an aircraft crosses the ionosphere faster towards a low satellite ahead than it flies. The worse of both counts.
+    """
+    towards = np.stack([np.sin(azimuth_rad), np.cos(azimuth_rad)], axis=-1) / np.tan(elevation_rad)[:, np.newaxis]
+    traced = np.stack([np.zeros_like(towards), towards])[:, np.newaxis]  # (2, 1, n, 2)
+    offset, height = places.offset_m[:, np.newaxis, :2], places.offset_m[:, np.newaxis, 2:]
+    forward = (places.speed_mps[:, np.newaxis] * places.los_axes[:, 0, :2])[:, np.newaxis]
+    descent = (places.speed_mps * places.tan_gpa)[:, np.newaxis, np.newaxis]
+    errors = worst_range_error_m(
+        threat.largest_gradient(elevation_rad),
+        offset - height * traced,
+        forward + descent * traced,
+        tau_s,
+        threat,
+        places.credit,
+        radius_m=places.radius_m,
+    )
+    return np.asarray(errors.max(axis=0))
+
+
+def cases_of(satellites: NDArray[np.int64], sky: Sky, params: GroundParams) -> Cases:
+    """Everything of a sky that does not change with the inflation.
+
+    Parameters
+    ----------
+    satellites : (n,) array
+        Their places on the satellite axis.
+    sky : Sky
+    params : GroundParams
+    """
+    elevation, azimuth, base, receivers = (each[satellites] for each in sky)
+    section, mask, places = params.ionosphere, params.elevation_mask_rad, places_of(params)
+    up = np.stack([np.cos(elevation) * np.sin(azimuth), np.cos(elevation) * np.cos(azimuth), np.sin(elevation)])
+    air = np.stack([sigma_air(aad, elevation, mask_rad=mask) for aad in _DESIGNATORS])
+    tropo = sigma_tropo_m(
+        params.refractivity_uncertainty, params.scale_height_m, elevation, places.height_m[:, np.newaxis], mask_rad=mask
+    )
+    speed, slant = places.speed_mps[:, np.newaxis], places.slant_m[:, np.newaxis]
+    error = range_errors_m(places, elevation, azimuth, section.threat(), params.tau_s[0])
+    fewest = int(receivers.min())
+    return Cases(
+        los=places.los_axes @ up,
+        tan_gpa=places.tan_gpa,
+        base_m=base,
+        air2_m2=air[places.designator_b.astype(np.int64)] ** 2 + tropo**2,
+        iono_m=sigma_iono_m(1.0, elevation, slant, speed, params.tau_s[0], mask_rad=mask),
+        error_m=error,
+        shape_m=error[places.decision].max(axis=0),
+        limit_m=places.limit_m,
+        tolerable_m=places.tolerable_m,
+        k_ffmd=K_FFMD_SINGLE if fewest < 2 else k_ffmd(fewest),
+        k_noise=section.k_noise,
+        nominal_vig=params.sigma_vert_iono_gradient,
+        affected=section.affected,
+    )
+
+
+def protection_in_words(params: GroundParams) -> str:
+    """What the station's protection against ionospheric fronts is, in one sentence."""
+    section = params.ionosphere
+    if not section.protects:
+        return "no threat model of ionospheric fronts: protection levels do not bound errors in a front"
+    threat = section.threat()
+    steepest = 1e6 * max(threat.gradient)
+    satellites = "one satellite" if section.affected == 1 else "two satellites"
+    bound = (
+        "no error beyond the protection levels"
+        if section.tolerable_vertical_m == 0.0
+        else f"errors up to {section.tolerable_vertical_m:g} m beyond the protection level at the decision height"
+    )
+    return (
+        f"ionospheric fronts of the {threat.name} model (up to {steepest:g} mm/km on {satellites} at once): {bound} "
+        f"within {params.max_use_distance_m / 1000.0:g} km on the approaches"
+    )
