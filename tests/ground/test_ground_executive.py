@@ -17,7 +17,7 @@ def held(passes, dt_s=0.5, readmission_s=2.0, max_gap_s=3.5):
     latch = advance(latch, NO, dt_s, max_gap_s)
     epochs = 1
     for passed in passes:
-        latch, _ = release(latch, readmission_s)
+        latch, _ = release(latch, readmission_s, readmission_s)
         if not latch.excluded[0]:
             return epochs
         epochs += 1
@@ -52,7 +52,7 @@ def test_first_cause_stays():
 def test_release_tells_what_ended():
     latch = exclude(initial_latch(3), np.array([True, True, False]), ExclusionCause.B_VALUE)
     latch = advance(latch, np.array([True, False, True]), 2.0, 3.5)
-    latch, ended = release(latch, 2.0)
+    latch, ended = release(latch, 2.0, 2.0)
     assert ended.tolist() == [True, False, False]
     assert latch.excluded.tolist() == [False, True, False]
 
