@@ -59,7 +59,7 @@ from gbas_ground.monitors.power_expectation import (
     power_expectation_step,
 )
 from gbas_ground.monitors.result import MonitorResult
-from gbas_ground.monitors.shared_receiver import SharedReceiver, plane_gains, seen_quiet, shared_receiver
+from gbas_ground.monitors.shared_receiver import Planes, SharedReceiver, planes_of, seen_quiet, shared_receiver
 from gbas_ground.monitors.two_frequency_divergence import (
     TwoFrequencyEpoch,
     TwoFrequencyInput,
@@ -223,7 +223,7 @@ class _Settings(NamedTuple):
     ephemeris: EphemerisResidualParams
     power: PowerExpectationParams
     site: GradientSite
-    plane_gains: FloatArray
+    planes: tuple[Planes, ...]
     troposphere: Troposphere
 
 
@@ -243,7 +243,7 @@ def _settings(params: GroundParams) -> _Settings:
         ephemeris=sections.ephemeris.params(gradient.bands),
         power=sections.power.params(params.max_gap_s),
         site=site,
-        plane_gains=plane_gains(site.baselines),
+        planes=planes_of(site.baselines, gradient.bands),
         troposphere=Troposphere(refractivity=params.refractivity, scale_height_m=params.scale_height_m),
     )
 
@@ -444,7 +444,7 @@ def _shared_receiver(
         differences,
         threshold_m,
         settings.site.baselines,
-        settings.plane_gains,
+        settings.planes,
         seen.due,
         seen.expected.elevation_rad,
         seen.expected.azimuth_rad,

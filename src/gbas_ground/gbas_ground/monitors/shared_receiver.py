@@ -4,24 +4,24 @@ A wrong survey, a code clock that is not the carriers' clock, half wavelengths i
 shows on many satellites, and on no baseline without that receiver. A satellite *points* to a receiver when
 
 - each of the receiver's baselines is beyond half its threshold,
-- each of the others is within half its threshold,
-- and the least of the first is so much more than the most of the others that no plane, that is neither a gradient of
-  the ionosphere nor an orbit, goes through the receivers: through three others that agree, and are not in a line, only
-  the level plane goes.
+- each of the others is within half its threshold, on both bands where there are two,
+- the least of the first is so much more than the most of the others that no plane, that is neither a gradient of the
+  ionosphere nor an orbit, goes through the receivers: through three others that agree, and are not in a line, only the
+  level plane goes,
+- nor does a plane that is whole wavelengths higher at some of the others, up to a gradient of 600 mm/km, and on both
+  bands where there are two.
 
 Three receivers always have a plane, and two always a line: there nobody can tell, and the satellites are excluded.
 
 The edge of a front may have reached one antenna alone: then the satellites it hits point to that receiver. The edge is
 a line, and it passes between antennas some hundred metres apart for those satellites only whose pierce points lie along
-it; pierce points are hundreds of kilometres apart. A receiver is therefore named when several satellites point to it
-whose pierce points are not along a line; and only when at least half of all satellites that can tell do so are the
+it; pierce points are hundreds of kilometres apart. A receiver is therefore named when several satellites point to it,
+half of those at least that are beyond a threshold, with pierce points that are not along a line; and only when at least half of all satellites that can tell do so are the
 satellites judged without it at once. Otherwise they are excluded as if nothing were known of the receiver, and come
 back when they have passed for the re-admission time with the receivers that are left.
 
 False alarms: one double difference at least is beyond its whole threshold, so that naming a receiver is part of the
 budget of the gradient monitor; two satellites more at half the threshold leave nothing to speak of.
-
-What it does not see: a gradient that makes whole wavelengths over two baselines of the other three at once.
 
 Source: ours.
 """
@@ -29,12 +29,14 @@ Source: ours.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from gbas_core.record import FloatArray
+from gbas_core.signals import IONO_RATIO, WAVELENGTH_M
 from gbas_ground.corrections import BoolArray
+from gbas_ground.gradient_detectability import wrap_m
 from gbas_ground.monitors.double_difference import Baselines, DoubleDifferences
 from gbas_ground.monitors.result import MonitorResult
 
@@ -42,6 +44,7 @@ from gbas_ground.monitors.result import MonitorResult
 _SHARE: Final = 0.5  # of the threshold: half is more than three sigmas
 _MARGIN: Final = 2.0  # over what a plane could do, for the noise
 _ACROSS_M: Final = 50.0e3  # pierce points within such a strip may be along one edge; a hundred times a baseline
+_LARGEST: Final = 600.0e-6  # gradient whose whole wavelengths are reckoned with [m/m]; threat models end at 425 mm/km
 _SHELL_M: Final = 350.0e3
 _EARTH_RADIUS_M: Final = 6_371_000.0
 _OTHERS: Final = 3  # baselines of the three receivers that have to agree
@@ -69,7 +72,7 @@ def shared_receiver(
     differences: DoubleDifferences,
     threshold_m: FloatArray,
     baselines: Baselines,
-    gains: FloatArray,
+    planes: tuple[Planes, ...],
     due: BoolArray,
     elevation_rad: FloatArray,
     azimuth_rad: FloatArray,
@@ -83,24 +86,26 @@ def shared_receiver(
     threshold_m : (B, F, N) array
         [m].
     baselines : Baselines
-    gains : (R,) array
-        From :func:`plane_gains`.
+    planes : tuple of Planes
+        From :func:`planes_of`.
     due : (N,) bool array
         Satellites that count.
     elevation_rad, azimuth_rad : (N,) arrays
     least : int
         Satellites that have to point to a receiver.
     """
-    pointing, tells = pointing_satellites(differences, threshold_m, baselines, gains)
+    pointing, tells = pointing_satellites(differences, threshold_m, planes)
     pointing = pointing & due
     number = pointing.sum(axis=1)
-    beyond = (np.abs(differences.residual_m) > threshold_m).any(axis=(0, 1))
+    beyond = due & tells & (np.abs(differences.residual_m) > threshold_m).any(axis=(0, 1))
     worst = int(number.argmax())
     theirs = pointing[worst]
+    failing = int((theirs & beyond).sum())
     named = (
         number[worst] >= max(1, least)
         and (number == number[worst]).sum() == 1
-        and bool((theirs & beyond).any())
+        and failing > 0
+        and 2 * failing >= int(beyond.sum())
         and across_m(elevation_rad[theirs], azimuth_rad[theirs]) >= _ACROSS_M
     )
     failed = (np.arange(len(number)) == worst) & named
@@ -111,23 +116,35 @@ def shared_receiver(
 
 
 def pointing_satellites(
-    differences: DoubleDifferences, threshold_m: FloatArray, baselines: Baselines, gains: FloatArray
+    differences: DoubleDifferences, threshold_m: FloatArray, planes: tuple[Planes, ...]
 ) -> tuple[BoolArray, BoolArray]:
     """Which satellites point to which receiver ``(R, N)``, and which could point to one at all ``(N,)``."""
     size = np.abs(differences.residual_m)
     share = size / threshold_m
-    count, n_sats = len(baselines.place_m), size.shape[-1]
-    pointing, tells = np.zeros((count, n_sats), dtype=bool), np.zeros(n_sats, dtype=bool)
-    for receiver, gain in enumerate(gains):
-        own = _of(receiver, baselines)
-        if (~own).sum() < _OTHERS or not np.isfinite(gain):
+    n_sats = size.shape[-1]
+    pointing, tells = np.zeros((len(planes), n_sats), dtype=bool), np.zeros(n_sats, dtype=bool)
+    for receiver, each in enumerate(planes):
+        if not np.isfinite(each.gain):
             continue
-        # a missing one is neither
+        own = each.own
+        # a missing one is neither; what is quiet on one band must not be whole wavelengths that the other one tells
         shared = (share[own] >= _SHARE).all(axis=0) & (share[~own] <= _SHARE).all(axis=0)
-        no_plane = size[own].min(axis=0) > _MARGIN * gain * size[~own].max(axis=0)
-        pointing[receiver] = (shared & no_plane).any(axis=0)
+        shared &= ~(share[~own] > _SHARE).any(axis=(0, 1))
+        largest = _MARGIN * each.gain * size[~own].max(axis=0)
+        found = (shared & (size[own].min(axis=0) > largest)).any(axis=0)
+        for satellite in np.flatnonzero(found):
+            tolerance = _SHARE * threshold_m[..., satellite]
+            tolerance[own] = np.maximum(tolerance[own], largest[:, satellite])
+            found[satellite] = not _whole_wavelengths(differences.residual_m[..., satellite], tolerance, each)
+        pointing[receiver] = found
         tells |= np.isfinite(size).all(axis=0).any(axis=0)
     return pointing, tells
+
+
+def _whole_wavelengths(residual_m: FloatArray, tolerance_m: FloatArray, planes: Planes) -> bool:
+    """Whether a plane with whole wavelengths between the other receivers explains all of a satellite's ``(B, F)``."""
+    misfit = np.abs(wrap_m(residual_m - planes.whole_m, planes.wavelength_m))
+    return bool(((misfit <= tolerance_m) | np.isnan(misfit)).all(axis=(1, 2)).any())
 
 
 def seen_quiet(
@@ -169,19 +186,56 @@ def _of(receiver: int, baselines: Baselines) -> BoolArray:
     return (baselines.first == receiver) | (baselines.second == receiver)
 
 
-def plane_gains(baselines: Baselines) -> FloatArray:
-    """How much the least of a receiver's baselines can be, over the most of the others, when a plane makes both, (R,).
+class Planes(NamedTuple):
+    """What planes through the antennas can do to the baselines of one receiver and to the others.
 
-    With the receiver's place ``p = sum a_j p_j`` of the other three and ``sum a_j = 1``, a plane has there
-    ``v - v_i = sum over j other than i of a_j (v_j - v_i)``. Infinite where the others are in a line, and without three
-    of them; made once.
+    Attributes
+    ----------
+    own : (B,) bool array
+        Baselines of the receiver.
+    gain : float
+        The least of the receiver's baselines over the most of the others is at most this; infinite without three others
+        that are not in a line.
+    whole_m : (K, B, F) array
+        Double differences of the planes with whole wavelengths between the others, not all zero [m].
+    wavelength_m : (F,) array
     """
-    place = baselines.place_m[:, :2] * 1e-3
-    gains = np.full(len(place), np.inf)
+
+    own: BoolArray
+    gain: float
+    whole_m: FloatArray
+    wavelength_m: FloatArray
+
+
+def planes_of(baselines: Baselines, bands: tuple[int, ...]) -> tuple[Planes, ...]:
+    """Of each receiver; made once for a station.
+
+    Notes
+    -----
+    With the receiver's place ``p = sum a_j p_j`` of the other three and ``sum a_j = 1``, a plane has there
+    ``v - v_i = sum over j other than i of a_j (v_j - v_i)``.
+    """
+    place = baselines.place_m[:, :2]
+    wavelength = WAVELENGTH_M[list(bands)]
+    result = []
     for row in range(len(place)):
+        own = _of(row, baselines)
         others = np.delete(place, row, axis=0)
-        system = np.vstack([others.T, np.ones(len(others))])
-        if len(others) == _OTHERS and np.linalg.cond(system) < _IN_A_LINE:
-            share = np.abs(np.linalg.solve(system, np.append(place[row], 1.0)))
-            gains[row] = max(1.0, float(share.sum() - share.max()))
-    return gains
+        system = np.vstack([others.T * 1e-3, np.ones(len(others))])
+        gain, whole = np.inf, np.zeros((0, len(own), len(bands)))
+        if (~own).sum() == _OTHERS and np.linalg.cond(system) < _IN_A_LINE:
+            share = np.abs(np.linalg.solve(system, np.append(place[row] * 1e-3, 1.0)))
+            gain = max(1.0, float(share.sum() - share.max()))
+            whole = _whole_planes(baselines.vector_m[:, :2], ~own, wavelength[0], IONO_RATIO[list(bands)])
+        result.append(Planes(own=own, gain=gain, whole_m=whole, wavelength_m=wavelength))
+    return tuple(result)
+
+
+def _whole_planes(vector_m: FloatArray, others: BoolArray, wavelength_m: float, ratio: FloatArray) -> FloatArray:
+    """Double differences ``(K, B, F)`` of the gradients that make whole wavelengths of the first band over `others`."""
+    two = vector_m[others][:2]
+    most = int(np.ceil(_LARGEST * ratio[0] * np.hypot(*two.T).max() / wavelength_m))
+    number = np.stack(np.meshgrid(*[np.arange(-most, most + 1)] * 2), axis=-1).reshape(-1, 2)
+    gradient = number[number.any(axis=1)] * wavelength_m @ np.linalg.inv(two).T / ratio[0]
+    gradient = gradient[np.hypot(*gradient.T) <= _LARGEST]
+    return np.asarray((gradient @ vector_m.T)[..., np.newaxis] * ratio)
