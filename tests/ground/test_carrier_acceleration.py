@@ -159,6 +159,18 @@ def test_a_large_fault_is_not_seen_on_others_through_the_clock(size):
     assert results[12].failed_satellites[[5, 40]].all()
 
 
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 5, 6])
+@pytest.mark.parametrize("size", [0.06, 0.3])
+def test_a_minority_of_faults_leaves_the_others_alone(count, size):
+    """Up to six of fourteen, the lowest: the mean moves the high ones, with their small sigmas, further over theirs."""
+    values = world(np.random.default_rng(count), 15)
+    faulty = np.flatnonzero(HERE)[:count]
+    values[12:, :, :, faulty] += size
+    _, results = run(values)
+    assert np.flatnonzero(results[12].failed_satellites).tolist() == faulty.tolist()
+    assert not any(np.delete(each.failed_satellites, faulty).any() for each in results)
+
+
 def test_one_channel_alone_is_the_channels_fault():
     values = world(np.random.default_rng(7), 15)
     values[12:, 2, 0, 5] += 0.2

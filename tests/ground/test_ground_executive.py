@@ -17,7 +17,7 @@ def held(passes, dt_s=0.5, readmission_s=2.0, max_gap_s=3.5):
     latch = advance(latch, NO, dt_s, max_gap_s)
     epochs = 1
     for passed in passes:
-        latch, _ = release(latch, readmission_s)
+        latch, _ = release(latch, readmission_s, readmission_s)
         if not latch.excluded[0]:
             return epochs
         epochs += 1
@@ -52,7 +52,7 @@ def test_first_cause_stays():
 def test_release_tells_what_ended():
     latch = exclude(initial_latch(3), np.array([True, True, False]), ExclusionCause.B_VALUE)
     latch = advance(latch, np.array([True, False, True]), 2.0, 3.5)
-    latch, ended = release(latch, 2.0)
+    latch, ended = release(latch, 2.0, 2.0)
     assert ended.tolist() == [True, False, False]
     assert latch.excluded.tolist() == [False, True, False]
 
@@ -64,3 +64,32 @@ def test_causes_are_words_and_latched_ones_are_told_apart():
         "TOO_FEW_COMMON_SATELLITES", "SIGMA_TOO_LARGE", "NO_RATE", "UNMONITORED", "IONOSPHERE_UNPROTECTED",
     }  # fmt: skip
     assert {cause.name for cause in ExclusionCause if cause < FIRST_LATCHED} == affairs
+
+
+def times_excluded(free_s, rounds, readmission_s=2.0, longest_s=10.0):
+    """Clear times that a thing waits for when it fails again each time it has been free for `free_s`."""
+    latch, waited = initial_latch(1), []
+    for _ in range(rounds):
+        latch = exclude(latch, YES, ExclusionCause.B_VALUE)
+        count = 0
+        while latch.excluded[0]:
+            latch = advance(latch, YES, 0.5, 3.5)
+            latch, _ = release(latch, readmission_s, longest_s)
+            count += 1
+        waited.append(0.5 * count)
+        for _ in range(round(free_s / 0.5)):
+            latch, _ = release(advance(latch, YES, 0.5, 3.5), readmission_s, longest_s)
+    return waited
+
+
+def test_what_fails_again_waits_twice_as_long_up_to_the_longest_time():
+    assert times_excluded(1.0, 5) == [2.0, 4.0, 8.0, 10.0, 10.0]
+
+
+def test_what_was_free_for_the_longest_time_is_new():
+    assert times_excluded(10.0, 3) == [2.0, 2.0, 2.0]
+    assert times_excluded(9.5, 3) == [2.0, 4.0, 8.0]
+
+
+def test_the_longest_time_is_no_less_than_the_first():
+    assert times_excluded(1.0, 3, longest_s=0.0) == [2.0, 2.0, 2.0]

@@ -29,7 +29,7 @@ def bad_receiver(station):
 def excluded(latch, row):
     cause = latch.cause.copy()
     cause[row] = int(ExclusionCause.SIGMA_SPREAD)
-    return Latch(cause=cause, clear_s=np.where(cause > 0, 50.0, 0.0))
+    return Latch(cause=cause, clear_s=np.where(cause > 0, 50.0, 0.0), wait_s=np.zeros(cause.shape))
 
 
 def nothing_used():

@@ -203,9 +203,32 @@ def test_a_code_fault_leaves_the_clocks_alone():
 def test_too_few_for_a_verdict_without_the_suspect_fail_together():
     def change(number, seen):
         seen["carrier_m"][:, L1, 50] += 0.2 * T_S * number  # one of four: without it three are left, with two others
+        seen["carrier_m"][..., GROUPS[0]] = np.nan
 
     result = run(World(), epochs=STEADY, change=change)
     assert np.flatnonzero(result.sound.failed).tolist() == GROUPS[1]
+
+
+def test_the_clock_is_that_of_both_constellations_where_suspects_leave_too_few():
+    def change(number, seen):
+        seen["carrier_m"][:, L1, 50] += 0.2 * T_S * number
+
+    result = run(World(), epochs=STEADY, change=change)
+    assert np.flatnonzero(result.sound.failed).tolist() == [50]
+    assert result.clock_satellites[[33, 50]].tolist() == [7.0, 3.0]  # two of its own and five of GPS
+
+
+@pytest.mark.parametrize("faulty", [(0, 3, 7), (0, 3, 7, 12), (7, 40, 50), (0, 33, 40, 50)])
+def test_a_minority_of_faults_leaves_the_others_alone(faulty):
+    """Up to four of nine, and though they are most of a constellation: its mean moves the healthy ones further."""
+
+    def change(number, seen):
+        seen["carrier_m"][:, :, list(faulty)] += 0.02 * T_S * number
+
+    results, _ = run(World(), epochs=STEADY, change=change, keep=True)
+    failed = np.array([each.sound.failed for each in results])
+    assert np.flatnonzero(failed.any(axis=0)).tolist() == list(faulty)
+    assert failed[-1, list(faulty)].all()
 
 
 def test_a_satellite_that_may_not_be_in_the_clock_is_not():

@@ -70,6 +70,8 @@ class ExclusionCause(IntEnum):
 
     COMMON_SLIP = 48
     """Several receivers lost count of the carrier at one epoch."""
+    RECEIVER_BASELINES = 49
+    """Carriers over the baselines of one receiver do not fit, on several satellites, and over the others they do."""
 
     @property
     def word(self) -> str:

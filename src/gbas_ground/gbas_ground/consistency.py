@@ -282,6 +282,7 @@ def standing(
     made: Corrections,
     exclusions: Exclusions,
     channel_ok: BoolArray,
+    receivers_quiet: FloatArray,
     satellite_ok: BoolArray,
     params: GroundParams,
 ) -> Standing:
@@ -293,6 +294,8 @@ def standing(
         As they are after :func:`agree`.
     channel_ok : (R, N) bool array
         Channels that are tracked and pass the monitors of single channels.
+    receivers_quiet : (R,) array
+        1 where a receiver would do on its baselines, 0 where not, NaN where nobody can tell.
     satellite_ok : (N,) bool array
         Satellites that the monitors of signals were seen to pass.
     params : GroundParams
@@ -301,7 +304,11 @@ def standing(
     -----
     A channel excluded by its B value has to be seen to agree. A channel excluded for another reason passes while its
     own monitor does, unless it is seen to disagree: there may be nothing to compare it with, and its B value is tested
-    when it comes back.
+    when it comes back. A receiver must not be seen to be wrong on its baselines; one that was excluded by them has to be
+    seen to be right.
+
+    "To agree" is to be within `params.readmission_share` of the threshold: what is excluded just above it must not come
+    back just below it.
 
     When the exclusions leave a constellation without a clock, nothing can be compared with anything, and no exclusion
     would ever end. Then everything is judged together as if nothing were excluded, and passes together or not at all.
@@ -309,10 +316,13 @@ def standing(
     unused = measured.settled & ~made.used
     result = check_unused(_residual_m(measured, made, params), made.channel_sigma_m, made.count, params.k_b)
     judged = unused & np.isfinite(result.statistic).all(axis=0) & (made.count > 0)
-    agrees, disagrees = judged & ~result.failed.any(axis=0), judged & result.failed.any(axis=0)
+    near = result.statistic <= params.readmission_share * result.threshold
+    agrees, disagrees = judged & near.all(axis=0), judged & result.failed.any(axis=0)
     needs_comparison = exclusions.channels.cause == ExclusionCause.B_VALUE
     channels = channel_ok & np.where(needs_comparison, agrees, ~disagrees)
     receivers = (agrees.sum(axis=1) >= params.min_common_satellites) & ~disagrees.any(axis=1)
+    by_baselines = exclusions.receivers.cause == ExclusionCause.RECEIVER_BASELINES
+    fits = (receivers_quiet == 1.0) | (np.isnan(receivers_quiet) & ~by_baselines)
 
     seen = (made.count > 0) & np.isfinite(made.rrc_mps).all(axis=0)
     within = ~np.asarray(np.any([result.failed.any(axis=0) for _, result in limit_checks(made, params)], axis=0))
@@ -323,7 +333,7 @@ def standing(
     together = _together(measured, made, channel_ok, params)
     return Standing(
         channels=channels | (channel_ok & together.channels),
-        receivers=receivers | (together.receivers & ~disagrees.any(axis=1)),
+        receivers=fits & (receivers | (together.receivers & ~disagrees.any(axis=1))),
         satellites=satellites | (satellite_ok & together.satellites),
     )
 

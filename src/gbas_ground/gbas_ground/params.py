@@ -268,6 +268,15 @@ class GroundParams(Declared):
         low=0.0,
         high=7200.0,
     )
+    readmission_longest_s: float = parameter(
+        "monitors", "readmission_longest_s", 960.0, "s",
+        "the time doubles with each further exclusion of the same thing, up to this; free for as long, and it is new",
+        low=0.0, high=86_400.0,
+    )  # fmt: skip
+    readmission_share: float = parameter(
+        "monitors", "readmission_share", 0.6, "-", "of a threshold that what is excluded has to stay below",
+        low=0.1, high=1.0,
+    )  # fmt: skip
     min_common_satellites: int = parameter(
         "monitors", "min_common_satellites", 3, "-", "fewest common satellites a constellation is corrected with",
         low=1, high=36,

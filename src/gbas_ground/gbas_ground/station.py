@@ -318,13 +318,14 @@ def _process(
     seen = _seen(state, epoch, followed, known, new_exclusions, changed, dt_s, params)
     watching, watched = watch(state.watching, seen, params)
     new_exclusions = _exclude_channels(new_exclusions, watched.channels, events)
+    new_exclusions = _exclude_receivers(new_exclusions, watched.receivers, ExclusionCause.RECEIVER_BASELINES, events)
     new_exclusions, noticed = _exclude_satellites(new_exclusions, watched)
     measured = _measured(state, followed, watched, known, changed, dt_s, params)
     made, new_exclusions, findings = agree(measured, new_exclusions, params)
     long_term, new_exclusions, slow, slow_looks = watch_sigmas(state.long_term, made, new_exclusions, dt_s, params)
     findings = (*noticed, *findings, *slow)
     events.found(findings)
-    new_exclusions = _advanced(new_exclusions, measured, made, followed.channel_ok, watched.passed, dt_s, params)
+    new_exclusions = _advanced(new_exclusions, measured, made, followed.channel_ok, watched, dt_s, params)
 
     condition = conclude(followed.tracked, followed.tracks, known, measured, made, new_exclusions, params)
     ionosphere, protection, condition = _protect(state, key, condition, made, followed.should, params, events)
@@ -415,7 +416,9 @@ def _follow(
     tracked = np.isfinite(raw.code_m[:, L1] + raw.carrier_m[:, L1])
     checks = _channel_checks(raw, should, tracked, params)
     exclusions = _exclude_channels(exclusions, checks, events)
-    exclusions = _exclude_receivers(exclusions, checks[0][1], params, events)
+    exclusions = _exclude_receivers(
+        exclusions, _far_receivers(checks[0][1], params), ExclusionCause.RECEIVER_FAULT, events
+    )
     clean = _without(raw, checks[0][1].failed)
     key = epoch_key(epoch.gps_week, epoch.tow_s)
     tracking, tracks = track(state.tracking, clean, key, _comparable_range_m(should, changed), params)
@@ -457,6 +460,10 @@ def _seen(
         slipped=tracks.slipped,
         usable=usable & high & ~exclusions.satellites.excluded,
         ready=usable & followed.settled,
+        suspended=followed.channel_ok
+        & followed.settled
+        & exclusions.receivers.excluded[:, np.newaxis]
+        & ~exclusions.channels.excluded,
         in_use=state.satellites == ChannelState.USABLE,
         due=due,
         may_refer=due & ~exclusions.satellites.excluded,
@@ -572,15 +579,18 @@ def _contribution_events(
 
 def _released(exclusions: Exclusions, params: GroundParams, events: EventLog) -> Exclusions:
     """End what has been clear for the re-admission time."""
-    channels, channels_ended = release(exclusions.channels, params.readmission_time_s)
-    receivers, receivers_ended = release(exclusions.receivers, params.readmission_time_s)
-    satellites, _ = release(exclusions.satellites, params.readmission_time_s)  # told when they are usable again
+    times = params.readmission_time_s, params.readmission_longest_s
+    channels, channels_ended = release(exclusions.channels, *times)
+    receivers, receivers_ended = release(exclusions.receivers, *times)
+    satellites, _ = release(exclusions.satellites, *times)  # told when they are usable again
     for row in np.flatnonzero(receivers_ended):
         cause = ExclusionCause(int(exclusions.receivers.cause[row]))
-        events.add(EventKind.READMISSION, f"rr{row + 1}", cause.word, params.readmission_time_s)
+        waited_s = max(params.readmission_time_s, float(exclusions.receivers.wait_s[row]))
+        events.add(EventKind.READMISSION, f"rr{row + 1}", cause.word, waited_s)
     for row, satellite in np.argwhere(channels_ended) if channels_ended.any() else ():
         cause = ExclusionCause(int(exclusions.channels.cause[row, satellite]))
-        events.add(EventKind.READMISSION, f"rr{row + 1}/{SAT_IDS[satellite]}", cause.word, params.readmission_time_s)
+        waited_s = max(params.readmission_time_s, float(exclusions.channels.wait_s[row, satellite]))
+        events.add(EventKind.READMISSION, f"rr{row + 1}/{SAT_IDS[satellite]}", cause.word, waited_s)
     return Exclusions(channels=channels, receivers=receivers, satellites=satellites)
 
 
@@ -605,22 +615,27 @@ def _exclude_channels(exclusions: Exclusions, checks: _Checks, events: EventLog)
     return replace(exclusions, channels=channels)
 
 
-def _exclude_receivers(
-    exclusions: Exclusions, residual: MonitorResult, params: GroundParams, events: EventLog
-) -> Exclusions:
-    """Receivers far from the expected ranges on several satellites.
+def _far_receivers(residual: MonitorResult, params: GroundParams) -> MonitorResult:
+    """Receivers far from the expected ranges on several satellites: how many, ``(R,)``.
 
     Then it is not the satellites but the receiver, its time tag or its position, and what is within the limit is wrong
     too.
     """
     failures = residual.failed.sum(axis=1)
-    failed = failures >= params.receiver_fault_channels
-    if not failed.any():
+    least = params.receiver_fault_channels
+    return MonitorResult(
+        statistic=failures.astype(np.float64), threshold=np.array(float(least)), failed=failures >= least
+    )
+
+
+def _exclude_receivers(
+    exclusions: Exclusions, result: MonitorResult, cause: ExclusionCause, events: EventLog
+) -> Exclusions:
+    if not result.failed.any():
         return exclusions
-    for row in np.flatnonzero(failed & ~exclusions.receivers.excluded):
-        cause = ExclusionCause.RECEIVER_FAULT.word
-        events.add(EventKind.EXCLUSION, f"rr{row + 1}", cause, failures[row], params.receiver_fault_channels)
-    return replace(exclusions, receivers=exclude(exclusions.receivers, failed, ExclusionCause.RECEIVER_FAULT))
+    for row in np.flatnonzero(result.failed & ~exclusions.receivers.excluded):
+        events.add(EventKind.EXCLUSION, f"rr{row + 1}", cause.word, *result.at(int(row)))
+    return replace(exclusions, receivers=exclude(exclusions.receivers, result.failed, cause))
 
 
 def _shift_m(
@@ -684,15 +699,16 @@ def _advanced(
     measured: Measured,
     made: Corrections,
     channel_ok: BoolArray,
-    satellite_ok: BoolArray,
+    watched: Watched,
     dt_s: float,
     params: GroundParams,
 ) -> Exclusions:
     """Count the clear time of everything that is excluded."""
     latches = (exclusions.channels, exclusions.receivers, exclusions.satellites)
-    if not any(latch.excluded.any() for latch in latches):
+    if not any(latch.remembers for latch in latches):
         return exclusions
-    passed = standing(measured, made, exclusions, channel_ok, satellite_ok, params)
+    satellite_ok = watched.passed(params.readmission_share)
+    passed = standing(measured, made, exclusions, channel_ok, watched.receivers_quiet, satellite_ok, params)
     return Exclusions(
         channels=advance(exclusions.channels, passed.channels, dt_s, params.max_gap_s),
         receivers=advance(exclusions.receivers, passed.receivers, dt_s, params.max_gap_s),

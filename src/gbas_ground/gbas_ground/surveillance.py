@@ -59,6 +59,7 @@ from gbas_ground.monitors.power_expectation import (
     power_expectation_step,
 )
 from gbas_ground.monitors.result import MonitorResult
+from gbas_ground.monitors.shared_receiver import Planes, SharedReceiver, planes_of, seen_quiet, shared_receiver
 from gbas_ground.monitors.two_frequency_divergence import (
     TwoFrequencyEpoch,
     TwoFrequencyInput,
@@ -77,6 +78,15 @@ _CARRIER_CAUSES: Final = (
     ("acceleration", ExclusionCause.CARRIER_ACCELERATION),
 )
 """Names and causes in the order of the acceleration monitor's statistics."""
+_GRADUAL: Final = frozenset(
+    {
+        ExclusionCause.CODE_CARRIER_DIVERGENCE,
+        ExclusionCause.TWO_FREQUENCY_DIVERGENCE,  # a square
+        ExclusionCause.IONOSPHERE_GRADIENT,
+        ExclusionCause.EPHEMERIS_RESIDUAL,
+    }
+)
+"""Causes whose statistic is a size in noise; a share of its threshold means something."""
 
 
 class Seen(NamedTuple):
@@ -92,6 +102,8 @@ class Seen(NamedTuple):
         Channels of satellites above the mask that are tracked, and that nothing excludes, nor their satellite.
     ready : (R, N) bool array
         Channels whose smoothing filter has settled, and whose receiver is not excluded either.
+    suspended : (R, N) bool array
+        Channels that have settled too, of receivers that are excluded.
     in_use : (N,) bool array
         Satellites that were broadcast at the epoch before.
     due : (N,) bool array
@@ -113,6 +125,7 @@ class Seen(NamedTuple):
     slipped: BoolArray
     usable: BoolArray
     ready: BoolArray
+    suspended: BoolArray
     in_use: BoolArray
     due: BoolArray
     may_refer: BoolArray
@@ -168,6 +181,10 @@ class Watched:
     ----------
     satellites, channels : tuple of Verdict
         What has to be excluded, and why.
+    receivers : MonitorResult
+        ``(R,)``: satellites that point to each receiver; it fails where they name it.
+    receivers_quiet : (R,) array
+        1 where a receiver that is excluded would do on its baselines, 0 where not, NaN where nobody can tell.
     ready : (N,) bool array
         Satellites that every required monitor could judge.
     orbit_bound : (N,) array
@@ -178,17 +195,24 @@ class Watched:
 
     satellites: tuple[Verdict, ...]
     channels: tuple[Verdict, ...]
+    receivers: MonitorResult
+    receivers_quiet: FloatArray
     ready: BoolArray
     orbit_bound: FloatArray
     looks: Mapping[str, Look]
     details: Mapping[str, Any]
 
-    @property
-    def passed(self) -> BoolArray:
-        """Satellites that were judged and not failed, ``(N,)``."""
+    def passed(self, share: float) -> BoolArray:
+        """Satellites that were judged, not failed, and are below `share` of every threshold, ``(N,)``.
+
+        What is excluded just above a threshold must not come back just below it.
+        """
         passed = self.ready
-        for verdict in self.satellites:
-            passed = passed & ~verdict.result.failed
+        for cause, result in self.satellites:
+            passed = passed & ~result.failed
+            if cause in _GRADUAL:
+                part = share**2 if cause == ExclusionCause.TWO_FREQUENCY_DIVERGENCE else share
+                passed = passed & ~(result.statistic > part * result.threshold)
         return passed
 
 
@@ -205,6 +229,7 @@ class _Settings(NamedTuple):
     power: PowerExpectationParams
     site: GradientSite
     orbit_site: OrbitSite
+    planes: tuple[Planes, ...]
     troposphere: Troposphere
 
 
@@ -213,6 +238,7 @@ def _settings(params: GroundParams) -> _Settings:
     sections = params.monitors
     gradient = params.gradient_monitor()
     ccd = sections.ccd.params(params.settle_time_s, params.max_gap_s)
+    site = gradient_site(params.receiver_positions_m(), params.reference_point_m(), gradient)
     return _Settings(
         ccd=ccd,
         ccd_f=sections.ccd_f.params(ccd.filters, params.refractivity * 1e-6 * params.scale_height_m),
@@ -222,8 +248,9 @@ def _settings(params: GroundParams) -> _Settings:
         ephemeris=params.ephemeris_monitor(),
         orbit_required=not params.external_monitor and (sections.ephemeris.required or params.gast_d),
         power=sections.power.params(params.max_gap_s),
-        site=gradient_site(params.receiver_positions_m(), params.reference_point_m(), gradient),
+        site=site,
         orbit_site=params.orbit_site(),
+        planes=planes_of(site.baselines, gradient.bands),
         troposphere=Troposphere(refractivity=params.refractivity, scale_height_m=params.scale_height_m),
     )
 
@@ -253,7 +280,7 @@ def watch(state: WatchState, seen: Seen, params: GroundParams) -> tuple[WatchSta
     steady = seen.ready
     for verdict in carrier.channels:
         steady = steady & ~verdict.result.failed
-    differences = _double_differences(residual_m, steady, seen, settings)
+    differences, receivers = _fitting_differences(residual_m, steady, seen, settings, params)
     gradient = _gradient(differences, seen, settings, exclude=sections.gradient.exclude)
     ephemeris, orbit, bound = _ephemeris(
         state.ephemeris, differences, seen, settings, exclude=sections.ephemeris.exclude
@@ -269,6 +296,8 @@ def watch(state: WatchState, seen: Seen, params: GroundParams) -> tuple[WatchSta
     watched = Watched(
         satellites=tuple(verdict for part in parts for verdict in part.satellites),
         channels=tuple(verdict for part in parts for verdict in part.channels),
+        receivers=receivers,
+        receivers_quiet=_quiet_receivers(residual_m, steady, seen, settings, params),
         ready=ready,
         orbit_bound=bound,
         looks={name: each for part in parts for name, each in part.looks.items()},
@@ -393,6 +422,60 @@ def _double_differences(
     references = reference_satellites(seen.may_refer, elevation_rad, params.references)
     used_m = np.where(channels[:, np.newaxis], residual_m[:, list(params.bands)], np.nan)
     return double_differences(used_m, settings.site.baselines, references, elevation_rad, params.noise, params.bands)
+
+
+def _fitting_differences(
+    residual_m: FloatArray, channels: BoolArray, seen: Seen, settings: _Settings, params: GroundParams
+) -> tuple[DoubleDifferences, MonitorResult]:
+    """Double differences to judge satellites by, and the receiver that is named by them.
+
+    When most satellites point to one receiver, theirs are those without it: they are judged at once as it will be from
+    now on. Otherwise the satellites bear it as if nothing were known of the receiver.
+    """
+    differences = _double_differences(residual_m, channels, seen, settings)
+    found = _shared_receiver(differences, seen, settings, params)
+    if not found.most:
+        return differences, found.receivers
+    kept = channels & ~found.receivers.failed[:, np.newaxis]
+    return _double_differences(residual_m, kept, seen, settings), found.receivers
+
+
+def _shared_receiver(
+    differences: DoubleDifferences, seen: Seen, settings: _Settings, params: GroundParams
+) -> SharedReceiver:
+    threshold_m = settings.site.k_ffd * differences.sigma_m
+    due = seen.due & (np.abs(differences.residual_m) > threshold_m).any(axis=(0, 1))
+    if not (due.any() and params.monitors.gradient.exclude):
+        count = len(seen.code_m)
+        least = np.full(count, float(params.receiver_fault_channels))
+        nobody = MonitorResult(statistic=np.zeros(count), threshold=least, failed=np.zeros(count, dtype=bool))
+        return SharedReceiver(receivers=nobody, most=False)
+    return shared_receiver(
+        differences,
+        threshold_m,
+        settings.site.baselines,
+        settings.planes,
+        seen.due,
+        seen.expected.elevation_rad,
+        seen.expected.azimuth_rad,
+        params.receiver_fault_channels,
+    )
+
+
+def _quiet_receivers(
+    residual_m: FloatArray, channels: BoolArray, seen: Seen, settings: _Settings, params: GroundParams
+) -> FloatArray:
+    """1 for receivers that would do on their baselines, 0 for those that would not, NaN where nobody can tell, (R,)."""
+    quiet = np.ones(len(seen.code_m))
+    baselines = settings.site.baselines
+    for receiver in np.flatnonzero(seen.suspended.any(axis=1)):
+        again = channels.copy()
+        again[receiver] |= seen.suspended[receiver]
+        differences = _double_differences(residual_m, again, seen, settings)
+        threshold_m = settings.site.k_ffd * differences.sigma_m
+        found = seen_quiet(differences, threshold_m, baselines, int(receiver), params.min_common_satellites)
+        quiet[receiver] = np.nan if found is None else float(found)
+    return quiet
 
 
 def _gradient(differences: DoubleDifferences, seen: Seen, settings: _Settings, *, exclude: bool) -> _Part:

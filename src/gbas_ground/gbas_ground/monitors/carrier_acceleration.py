@@ -31,6 +31,7 @@ from gbas_core.satellites import N_SATS
 from gbas_core.signals import L1, L5
 from gbas_ground.corrections import BoolArray
 from gbas_ground.monitors.carrier_noise import CarrierNoise
+from gbas_ground.monitors.expected_range import row_median
 from gbas_ground.monitors.false_alarm import EPOCH_S, FALSE_EXCLUSION, false_alarm_multiplier
 from gbas_ground.monitors.result import MonitorResult, upper_limit
 
@@ -245,8 +246,10 @@ def _judged(
 ) -> _Known:
     """Statistics with the receivers' clocks taken from satellites that do not fail.
 
-    The worst satellite of each receiver and band leaves its clock's set, and all is computed again, until nobody in a
-    set fails: a bad satellite must not be seen on the others through the clock.
+    When one fails, all whose step, rate or acceleration is beyond the threshold from the receiver's median leave its
+    clock's set: a minority does not move the median, and a healthy satellite must not be the first to fail through the
+    mean. Then the worst satellite of each receiver and band leaves, and all is computed again, until nobody in a set
+    fails: a bad satellite must not be seen on the others through the clock.
     """
     change = history_m - history_m[0]
     there = np.isfinite(change)
@@ -255,13 +258,36 @@ def _judged(
     s = (powers @ there.reshape(len(there), sigma_m.size).astype(np.float64)).reshape(5, *sigma_m.shape)
     epochs = there.any(axis=-1, keepdims=True).sum(axis=0)
     in_set = (s[0] == epochs) & there[0] & (sigma_m > 0.0)
+    first = True
     while True:
         known = _statistics(change, there, powers[:3], s, sigma_m, in_set, k, params)
         ratio = (np.abs(known.statistic) / known.threshold).max(axis=0)
         beyond = in_set & (ratio > 1.0)
         if not beyond.any():
             return known
+        if first:
+            first = False
+            apart = in_set & _apart(change, powers[:3], s, in_set, known.threshold, params)
+            if apart.any():
+                in_set = in_set & ~apart
+                continue
         in_set = in_set & ~(beyond & (ratio == np.where(beyond, ratio, 0.0).max(axis=-1, keepdims=True, initial=0.0)))
+
+
+def _apart(
+    change_m: FloatArray,
+    powers: FloatArray,
+    s: FloatArray,
+    in_set: BoolArray,
+    threshold: FloatArray,
+    params: CarrierAccelerationParams,
+) -> BoolArray:
+    """Channels whose statistics, clock and all, are beyond the threshold from the median of the set, ``(R, F, n)``."""
+    m = (powers @ change_m.reshape(len(change_m), in_set.size)).reshape(3, *in_set.shape)
+    statistic, _ = _solved(s, m, params.least_points)
+    known = in_set & np.isfinite(statistic).all(axis=0)
+    middle = row_median(np.where(known, statistic, np.nan))
+    return np.asarray(known & (np.abs(statistic - middle) > threshold).any(axis=0))
 
 
 def _statistics(

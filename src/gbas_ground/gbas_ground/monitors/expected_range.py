@@ -34,12 +34,12 @@ def check_expected_range(raw_correction_m: FloatArray, tracked: BoolArray, limit
     set of the corrections is larger than that.
     """
     own = np.where(tracked & CLOCK_GROUPS[:, np.newaxis], raw_correction_m, np.nan)  # (k, R, N)
-    by_group = own - _median(own)
+    by_group = own - row_median(own)
     residual = np.where(CLOCK_GROUPS[0], by_group[0], by_group[1])
     return upper_limit(np.abs(residual), limit_m, tracked)
 
 
-def _median(values: FloatArray) -> FloatArray:
+def row_median(values: FloatArray) -> FloatArray:
     """Median of the finite values of each row, as a column; NaN for a row without any."""
     ordered = np.sort(values, axis=-1)  # NaN last
     count = np.isfinite(values).sum(axis=-1, keepdims=True)

@@ -17,8 +17,10 @@ The receiver clock of a satellite is the mean over the *other* satellites of its
 it is removed in two steps: the mean of all before the filters, and what the others have left of it behind them, which
 comes to the same. A fault as large as d would appear on n others as -d/n, and pass the threshold there first if their
 sigma is smaller. Behind the filters a satellite under suspicion is therefore taken out of the others' clock, together
-with all it has done to it. When a satellite fails, suspicion falls on the largest carrier rate of its constellation,
-and stays there if it halves what is above the threshold; then on the next.
+with all it has done to it. When a satellite fails, suspicion falls on all whose carrier rate is beyond the threshold
+from the median of both constellations, whose clocks run alike; then on the largest carrier rate of its constellation,
+and on the next. It stays where it halves what is above the threshold. Where it leaves too few satellites of a
+constellation, the clock is that of both.
 
 A channel that misses epochs bridges the gap with the mean accumulated meanwhile.
 
@@ -49,6 +51,7 @@ from gbas_core.signals import BANDS, L1, L5, N_BANDS, SPEED_OF_LIGHT_MPS
 from gbas_ground.corrections import CLOCK_GROUPS, BoolArray
 from gbas_ground.monitors.code_carrier_divergence import receiver_mean
 from gbas_ground.monitors.divergence_covariance import PRINTED_COVARIANCE, StatisticCovariance
+from gbas_ground.monitors.expected_range import row_median
 from gbas_ground.monitors.result import MonitorResult, upper_limit
 
 Form = Literal["paper", "sound"]
@@ -57,6 +60,7 @@ DEGREES_OF_FREEDOM: Final[dict[Form, int]] = {"paper": 4, "sound": 3}
 _OBLIQUITY: Final = 0.002
 # Uncertain, ours: more satellites at once are no satellites' faults, and all of them fail.
 _MOST_SUSPECTS: Final = 4
+_ALL: Final = np.ones((1, N_SATS), dtype=bool)
 _PRINTED_INVERSE: Final = np.linalg.pinv(PRINTED_COVARIANCE)
 
 
@@ -234,18 +238,42 @@ def two_frequency_step(
     counts = settled(codes, params.filters).all(axis=0) & settled(new.carrier, params.filters)
     suspect = np.zeros(N_SATS, dtype=bool)
     result = _judged(code_rates, carrier_rate, counts, suspect, epoch, params)
-    for group in CLOCK_GROUPS:
+    in_clock = np.logical_or.reduce(epoch.clock_used, axis=0)  # what is in no clock disturbs none
+    if (result.sound.failed & in_clock).any():
+        apart = _apart(result, carrier_rate, counts, epoch, params)
+        if apart.any():
+            without = _judged(code_rates, carrier_rate, counts, apart, epoch, params)
+            if _explains(without, result, ~apart):
+                suspect, result = apart, without
+    for group in CLOCK_GROUPS & in_clock:
         for _ in range(_MOST_SUSPECTS):
             if not (result.sound.failed & group & ~suspect).any():
                 break
-            more = suspect | _most_deviant(result, group & epoch.clock_used.any(axis=0) & ~suspect)
+            more = suspect | _most_deviant(result, group & ~suspect)
             without = _judged(code_rates, carrier_rate, counts, more, epoch, params)
-            judged = np.isfinite(without.sound.statistic[result.sound.failed]).all()
-            rest = group & ~more
-            if not judged or _excess(without, rest) > 0.5 * _excess(result, rest):
-                break  # too few are left to judge what has failed, or it was not the clock
+            if not _explains(without, result, group & ~more):
+                break
             suspect, result = more, without
     return replace(new, codes=codes), result
+
+
+def _apart(
+    result: TwoFrequencyEpoch, rate_mps: FloatArray, counts: BoolArray, epoch: TwoFrequencyInput,
+    params: TwoFrequencyParams,
+) -> BoolArray:  # fmt: skip
+    """Satellites in the clocks whose carrier rate is far from the median, which a minority does not move, ``(N,)``."""
+    rate = np.where(counts & epoch.clock_used, rate_mps, np.nan)
+    deviation = rate - row_median(rate)
+    there = np.isfinite(deviation)
+    mean = np.where(there, deviation, 0.0).sum(axis=0) / np.maximum(there.sum(axis=0), 1)
+    variance = result.covariance[:, 2, 2]
+    return np.asarray(mean**2 > threshold("sound", params.p_false_alarm) * variance)
+
+
+def _explains(without: TwoFrequencyEpoch, result: TwoFrequencyEpoch, rest: BoolArray) -> bool:
+    """Whether it was the clock: all that had failed can be judged, and the rest is above the threshold by half less."""
+    judged = np.isfinite(without.sound.statistic[result.sound.failed]).all()
+    return bool(judged and _excess(without, rest) <= 0.5 * _excess(result, rest))
 
 
 def _most_deviant(result: TwoFrequencyEpoch, candidates: BoolArray) -> BoolArray:
@@ -269,7 +297,12 @@ def _judged(
     params: TwoFrequencyParams,
 ) -> TwoFrequencyEpoch:
     """Statistics and verdicts with receiver clocks that do without the satellites under suspicion."""
-    clock, others = _others_mean(carrier_rate, counts & epoch.clock_used & ~suspect, params.min_clock_satellites)
+    member, fewest = counts & epoch.clock_used & ~suspect, params.min_clock_satellites
+    clock, others = _others_mean(carrier_rate, member, fewest)
+    if suspect.any():
+        both, of_both = _others_mean(carrier_rate, member, fewest, groups=_ALL)
+        few = others < fewest
+        clock, others = np.where(few, both, clock), np.where(few, of_both, others)
     receiver = np.concatenate([code_rates, (carrier_rate - clock)[np.newaxis]])
     counts = counts & np.isfinite(clock)
     averaged = counts & epoch.used
@@ -363,7 +396,7 @@ def _carrier(
     change = np.where(alive & present & ~epoch.rebased, residual - state.residual_m, np.nan)
     # Channels measured at the last epoch, too: what they have in common is the clock of this one interval.
     together = np.isfinite(change) & (state.since_s == 0.0)
-    accumulated = state.clock_m + _mean(change, together & epoch.clock_used)
+    accumulated = state.clock_m + _mean_of_all(change, together & epoch.clock_used)
     rate = (change - accumulated) / since_s
     # The one epoch at which the expected range jumps tells nothing: the filter goes on with the rate it has.
     coasting = epoch.rebased & ~state.rebased & alive & present
@@ -380,28 +413,25 @@ def _carrier(
     return new, filtered
 
 
-def _totals(values: FloatArray, member: BoolArray) -> tuple[FloatArray, FloatArray]:
-    """Sum over the members of each channel's constellation, and how many they are, ``(R, N)``."""
-    own = np.where(member, values, 0.0)
-    total, count = np.zeros_like(own), np.zeros_like(own)
-    for group in CLOCK_GROUPS:
-        total += np.where(group, (own * group).sum(axis=-1, keepdims=True), 0.0)
-        count += np.where(group, (member & group).sum(axis=-1, keepdims=True), 0)
-    return total, count
+def _mean_of_all(values: FloatArray, member: BoolArray) -> FloatArray:
+    """Mean over the members of each receiver ``(R, 1)``; NaN where there are none."""
+    count = member.sum(axis=-1, keepdims=True)
+    total = np.where(member, values, 0.0).sum(axis=-1, keepdims=True)
+    return np.asarray(np.where(count > 0, total / np.maximum(count, 1), np.nan))
 
 
-def _mean(values: FloatArray, member: BoolArray) -> FloatArray:
-    """Mean over the members of each channel's constellation; NaN where there are none."""
-    total, count = _totals(values, member)
-    return np.where(count > 0.0, total / np.maximum(count, 1.0), np.nan)
-
-
-def _others_mean(values: FloatArray, member: BoolArray, fewest: int) -> tuple[FloatArray, FloatArray]:
-    """Mean over the other members of the same constellation, and how many they are; NaN below `fewest`.
+def _others_mean(
+    values: FloatArray, member: BoolArray, fewest: int, *, groups: BoolArray = CLOCK_GROUPS
+) -> tuple[FloatArray, FloatArray]:
+    """Mean over the other members of the same group, and how many they are, ``(R, N)``; NaN below `fewest`.
 
     Source: ENC 2015, eq (13), with i for the first j.
     """
-    total, count = _totals(values, member)
+    own = np.where(member, values, 0.0)
+    total, count = np.zeros_like(own), np.zeros_like(own)
+    for group in groups:
+        total += np.where(group, (own * group).sum(axis=-1, keepdims=True), 0.0)
+        count += np.where(group, (member & group).sum(axis=-1, keepdims=True), 0)
     others = count - member
-    mean = (total - np.where(member, values, 0.0)) / np.maximum(others, 1.0)
+    mean = (total - own) / np.maximum(others, 1.0)
     return np.where(others >= fewest, mean, np.nan), others
