@@ -96,7 +96,7 @@ def test_live_nodes_in_real_time(data_dir: Path, tmp_path: Path) -> None:
           smoothing: {settle_time_s: 0.0}
           monitors: {readmission_time_s: 0.0}
           atmosphere: {sigma_vert_iono_gradient: 4.0e-6, refractivity_uncertainty: 20.0}
-          ephemeris: {p: 1.5e-4, k_md_e_c: 5.0}
+          ephemeris: {k_md_e_c: 5.0}
         """
     )
     (tmp_path / "station.yaml").write_text(yaml.safe_dump(station), encoding="utf-8")

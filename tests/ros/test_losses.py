@@ -37,7 +37,7 @@ STATION: dict[str, Any] = {
     "smoothing": {"settle_time_s": 10.0},
     "monitors": {"require_cn0": False},
     "vdb": {"slots": "AB"},
-    "ephemeris": {"k_md_e_c": 5.0, "p": 1.5e-4},
+    "ephemeris": {"k_md_e_c": 5.0},
     "atmosphere": {"sigma_vert_iono_gradient": 4e-6, "refractivity_uncertainty": 20.0},
 }
 RECEIVER: dict[str, Any] = {"settle_s": 10.0, "max_speed_mps": 1.0}

@@ -28,7 +28,7 @@ GROUND = {
         "sigma_vert_iono_gradient": 4e-6, "refractivity": 379.0, "refractivity_uncertainty": 20.0,
         "scale_height_m": 7900.0,
     },
-    "ephemeris": {"p": 1.5e-4, "k_md_e_c": 5.0},
+    "ephemeris": {"k_md_e_c": 5.0},
     "vdb": {"slots": "AB"},
     "approaches": {
         "rwy26": {

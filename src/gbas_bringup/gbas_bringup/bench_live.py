@@ -243,7 +243,8 @@ def _files_config(directory: Path) -> RunConfig:
     station["station"] |= {**place, "systems": "G"}
     station["receivers"] = {"rr1_ecef_m": list(GROUND_XYZ_M), "minimum": 1}
     station["monitors"] = {"require_cn0": False}
-    document = {"/**": {"ros__parameters": {"ground": station, "airborne": {"service": "C", "systems": "G"}}}}
+    airborne = {"service": "C", "systems": "G", "use_unhealthy": True}  # this station claims no service
+    document = {"/**": {"ros__parameters": {"ground": station, "airborne": airborne}}}
     path = directory / "files.yaml"
     directory.mkdir(parents=True, exist_ok=True)
     path.write_text(yaml.safe_dump(document), encoding="utf-8")
