@@ -222,7 +222,7 @@ def _direction_items(n_trials: int, random: np.random.Generator) -> list[Item]:
                 unit="deg",
                 definition=f"four receivers, L1 and L5, satellite and reference at 60 degrees, {n_trials} directions; "
                 f"stated {np.sqrt(np.nanmean(stated**2)):.3f} degrees; right whole wavelengths given. One epoch alone "
-                f"has {count.mean():.1f} candidates (mean), and its best fit is the truth in {100.0 * best.mean():.0f} %",
+                f"has {count.mean():.1f} candidates (mean); its best fit is the truth in {100.0 * best.mean():.0f} %",
             )
         )
     return items
