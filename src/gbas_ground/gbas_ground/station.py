@@ -305,9 +305,7 @@ def _process(
     seen = _seen(state, epoch, followed, known, new_exclusions, changed, dt_s, params)
     watching, watched = watch(state.watching, seen, params)
     new_exclusions = _exclude_channels(new_exclusions, watched.channels, events)
-    new_exclusions = _exclude_receivers(
-        new_exclusions, watched.receivers, ExclusionCause.RECEIVER_BASELINES, events
-    )
+    new_exclusions = _exclude_receivers(new_exclusions, watched.receivers, ExclusionCause.RECEIVER_BASELINES, events)
     new_exclusions, noticed = _exclude_satellites(new_exclusions, watched)
     measured = _measured(state, followed, watched, known, changed, dt_s, params)
     made, new_exclusions, findings = agree(measured, new_exclusions, params)
