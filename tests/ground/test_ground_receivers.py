@@ -234,3 +234,26 @@ def test_what_is_excluded_stays_out_until_it_is_well_below_its_threshold():
         assert _excluded(out)[10:24].all()
         assert _excluded(out)[-1] != comes_back
         assert out.integrity[-1].tow_s == TOW_S + 34.5
+
+
+def _ramp(rate_mps, satellites):
+    """Codes and carriers of some satellites that run away from the onset at 22 s."""
+    theirs = np.isin(np.arange(N_SATS), [SAT_INDEX[each] for each in satellites])
+
+    def change(observed):
+        since_s = observed[0].tow_s - 216_000.0 - 22.0
+        size = rate_mps * since_s * theirs
+        return tuple(replace(each, code_m=each.code_m + size, carrier_m=each.carrier_m + size) for each in observed)
+
+    return change
+
+
+@pytest.mark.parametrize(
+    "faulty", [("G01", "G08", "G16", "G06", "G18"), ("G01", "G08", "G16", "G12", "E08", "E15", "E24")]
+)
+def test_satellites_that_run_away_do_not_take_healthy_ones_with_them(world, station, faulty):
+    """Five of the eight of GPS, seven of all seventeen: the mean of a constellation moves its healthy ones further."""
+    _, _, told = watched(world, station, _ramp(0.02, faulty), seconds=36.0, onset_s=22.0)
+    subjects = {subject for _, subject, _ in told}
+    assert subjects <= set(faulty)
+    assert len(subjects) >= 4  # the lowest, with larger sigmas, take longer
