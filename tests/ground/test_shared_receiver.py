@@ -1,4 +1,4 @@
-"""Whose fault is it, the receiver's or the satellites'? Double differences made by hand, on the site of four receivers."""
+"""Is it the receiver or the satellites? Double differences made by hand, on the site of four receivers."""
 
 from __future__ import annotations
 

@@ -83,7 +83,7 @@ def conclude(
 def _channel_cause(tracked: BoolArray, exclusions: Exclusions) -> FloatArray:
     """Cause of the exclusions of a satellite's channels, ``(N,)``; the largest number where there are several."""
     by_receiver = tracked & exclusions.receivers.excluded[:, np.newaxis]
-    causes = np.where(by_receiver, int(ExclusionCause.RECEIVER_FAULT), exclusions.channels.cause)
+    causes = np.where(by_receiver, exclusions.receivers.cause[:, np.newaxis], exclusions.channels.cause)
     return np.asarray(causes.max(axis=0), dtype=np.float64)
 
 

@@ -304,8 +304,8 @@ def standing(
     -----
     A channel excluded by its B value has to be seen to agree. A channel excluded for another reason passes while its
     own monitor does, unless it is seen to disagree: there may be nothing to compare it with, and its B value is tested
-    when it comes back. A receiver must not be seen to be wrong on its baselines; one that was excluded by them has to be
-    seen to be right.
+    when it comes back. A receiver must not be seen to be wrong on its baselines; one that was excluded by them has to
+    be seen to be right.
 
     "To agree" is to be within `params.readmission_share` of the threshold: what is excluded just above it must not come
     back just below it.

@@ -19,7 +19,7 @@ from gbas_core.record import FloatArray
 from gbas_core.satellites import missing
 from gbas_core.signals import L1, L5, N_BANDS
 from gbas_ground.causes import ExclusionCause
-from gbas_ground.corrections import BoolArray
+from gbas_ground.corrections import CLOCK_GROUPS, BoolArray
 from gbas_ground.geometry import Expected
 from gbas_ground.looks import Look, look, place_of_worst, worst_of
 from gbas_ground.monitors.carrier_acceleration import (
@@ -276,8 +276,8 @@ def watch(state: WatchState, seen: Seen, params: GroundParams) -> tuple[WatchSta
     acceleration, carrier = _acceleration(
         state.acceleration, residual_m, seen, settings, exclude=sections.acceleration.exclude
     )
-    # A channel that jumped alone must not make a gradient of its satellite.
-    steady = seen.ready
+    # A channel that jumped alone must not make a gradient of its satellite, nor what is left of a receiver's channels.
+    steady = seen.ready & _enough(seen.ready, params.min_common_satellites)
     for verdict in carrier.channels:
         steady = steady & ~verdict.result.failed
     differences, receivers = _fitting_differences(residual_m, steady, seen, settings, params)
@@ -422,6 +422,12 @@ def _double_differences(
     references = reference_satellites(seen.may_refer, elevation_rad, params.references)
     used_m = np.where(channels[:, np.newaxis], residual_m[:, list(params.bands)], np.nan)
     return double_differences(used_m, settings.site.baselines, references, elevation_rad, params.noise, params.bands)
+
+
+def _enough(channels: BoolArray, least: int) -> BoolArray:
+    """Channels of receivers that have enough of them in a constellation to be in use there, ``(R, N)``."""
+    number = channels.astype(np.int64) @ CLOCK_GROUPS.T.astype(np.int64)
+    return np.asarray((number >= least) @ CLOCK_GROUPS)
 
 
 def _fitting_differences(

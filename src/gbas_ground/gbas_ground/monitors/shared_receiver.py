@@ -16,9 +16,10 @@ Three receivers always have a plane, and two always a line: there nobody can tel
 The edge of a front may have reached one antenna alone: then the satellites it hits point to that receiver. The edge is
 a line, and it passes between antennas some hundred metres apart for those satellites only whose pierce points lie along
 it; pierce points are hundreds of kilometres apart. A receiver is therefore named when several satellites point to it,
-half of those at least that are beyond a threshold, with pierce points that are not along a line; and only when at least half of all satellites that can tell do so are the
-satellites judged without it at once. Otherwise they are excluded as if nothing were known of the receiver, and come
-back when they have passed for the re-admission time with the receivers that are left.
+half of those at least that are beyond a threshold, with pierce points that are not along a line. Only when at least
+half of all satellites that can tell point to it are the satellites judged without it at once. Otherwise they are
+excluded as if nothing were known of the receiver, and come back when they have passed for the re-admission time with
+the receivers that are left.
 
 False alarms: one double difference at least is beyond its whole threshold, so that naming a receiver is part of the
 budget of the gradient monitor; two satellites more at half the threshold leave nothing to speak of.
@@ -183,7 +184,7 @@ def across_m(elevation_rad: FloatArray, azimuth_rad: FloatArray) -> float:
 
 
 def _of(receiver: int, baselines: Baselines) -> BoolArray:
-    return (baselines.first == receiver) | (baselines.second == receiver)
+    return np.asarray((baselines.first == receiver) | (baselines.second == receiver))
 
 
 class Planes(NamedTuple):

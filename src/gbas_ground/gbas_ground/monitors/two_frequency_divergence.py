@@ -17,10 +17,10 @@ The receiver clock of a satellite is the mean over the *other* satellites of its
 it is removed in two steps: the mean of all before the filters, and what the others have left of it behind them, which
 comes to the same. A fault as large as d would appear on n others as -d/n, and pass the threshold there first if their
 sigma is smaller. Behind the filters a satellite under suspicion is therefore taken out of the others' clock, together
-with all it has done to it. When a satellite fails, suspicion falls on all whose carrier rate is beyond the threshold
-from the median of both constellations, whose clocks run alike; then on the largest carrier rate of its constellation,
-and on the next. It stays where it halves what is above the threshold. Where it leaves too few satellites of a
-constellation, the clock is that of both.
+with all it has done to it. When a satellite fails, suspicion falls on all whose carrier rate is beyond half the
+threshold from the median of both constellations, whose clocks run alike; then on the largest carrier rate of its
+constellation, and on the next, where that halves what is above the threshold. Where suspicion leaves too few satellites
+of a constellation, the clock is that of both.
 
 A channel that misses epochs bridges the gap with the mean accumulated meanwhile.
 
@@ -60,6 +60,8 @@ DEGREES_OF_FREEDOM: Final[dict[Form, int]] = {"paper": 4, "sound": 3}
 _OBLIQUITY: Final = 0.002
 # Uncertain, ours: more satellites at once are no satellites' faults, and all of them fail.
 _MOST_SUSPECTS: Final = 4
+# Uncertain, ours: of the threshold; a satellite that is in no clock costs little, a faulty one that is in them much.
+_SUSPICION: Final = 0.5
 _ALL: Final = np.ones((1, N_SATS), dtype=bool)
 _PRINTED_INVERSE: Final = np.linalg.pinv(PRINTED_COVARIANCE)
 
@@ -243,7 +245,7 @@ def two_frequency_step(
         apart = _apart(result, carrier_rate, counts, epoch, params)
         if apart.any():
             without = _judged(code_rates, carrier_rate, counts, apart, epoch, params)
-            if _explains(without, result, ~apart):
+            if _explains(without, result, ~apart, 1.0):
                 suspect, result = apart, without
     for group in CLOCK_GROUPS & in_clock:
         for _ in range(_MOST_SUSPECTS):
@@ -251,7 +253,7 @@ def two_frequency_step(
                 break
             more = suspect | _most_deviant(result, group & ~suspect)
             without = _judged(code_rates, carrier_rate, counts, more, epoch, params)
-            if not _explains(without, result, group & ~more):
+            if not _explains(without, result, group & ~more, 0.5):
                 break
             suspect, result = more, without
     return replace(new, codes=codes), result
@@ -267,13 +269,13 @@ def _apart(
     there = np.isfinite(deviation)
     mean = np.where(there, deviation, 0.0).sum(axis=0) / np.maximum(there.sum(axis=0), 1)
     variance = result.covariance[:, 2, 2]
-    return np.asarray(mean**2 > threshold("sound", params.p_false_alarm) * variance)
+    return np.asarray(mean**2 > _SUSPICION**2 * threshold("sound", params.p_false_alarm) * variance)
 
 
-def _explains(without: TwoFrequencyEpoch, result: TwoFrequencyEpoch, rest: BoolArray) -> bool:
-    """Whether it was the clock: all that had failed can be judged, and the rest is above the threshold by half less."""
+def _explains(without: TwoFrequencyEpoch, result: TwoFrequencyEpoch, rest: BoolArray, share: float) -> bool:
+    """Whether it was the clock: all that failed can be judged, and of what the rest had too much a share is left."""
     judged = np.isfinite(without.sound.statistic[result.sound.failed]).all()
-    return bool(judged and _excess(without, rest) <= 0.5 * _excess(result, rest))
+    return bool(judged and _excess(without, rest) <= share * _excess(result, rest))
 
 
 def _most_deviant(result: TwoFrequencyEpoch, candidates: BoolArray) -> BoolArray:
