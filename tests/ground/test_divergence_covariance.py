@@ -14,6 +14,7 @@ from gbas_ground.monitors.divergence_covariance import (
     StatisticCovariance,
     calibrate,
     measurement_covariance,
+    published_by_origin,
 )
 
 T_S, TAU_S = 0.5, 30.0
@@ -196,12 +197,13 @@ def test_white_is_checked():
         measurement_covariance(np.ones(4), L1, L5, alpha=0.1, interval_s=0.5, clock_satellites=1.0, white="pink")
 
 
-def test_the_default_is_the_printed_bound_for_one_receiver_and_divides_the_codes_alone():
-    default, printed = StatisticCovariance(), PRINTED_COVARIANCE[np.ix_([0, 1, 3], [0, 1, 3])]
-    one, four = (default.at(np.ones(1), np.full(1, count), np.full(1, np.inf))[0] for count in (1.0, 4.0))
-    assert one == pytest.approx(printed, rel=1e-12)
-    assert four[2] == pytest.approx(printed[2], rel=1e-12)  # all that has the carrier in it
-    assert np.diag(four)[:2] == pytest.approx(0.25 * np.diag(printed)[:2], rel=1e-4)
+def test_the_default_divides_nothing_and_the_one_by_origin_the_codes_alone():
+    printed = PRINTED_COVARIANCE[np.ix_([0, 1, 3], [0, 1, 3])]
+    for covariance, share in ((StatisticCovariance(), 1.0), (published_by_origin(), 0.25)):
+        one, four = (covariance.at(np.ones(1), np.full(1, count), np.full(1, np.inf))[0] for count in (1.0, 4.0))
+        assert one == pytest.approx(printed, rel=1e-12)
+        assert four[2] == pytest.approx(printed[2], rel=1e-12)  # all that has the carrier in it
+        assert np.diag(four)[:2] == pytest.approx(share * np.diag(printed)[:2], rel=1e-4)
 
 
 @pytest.mark.parametrize("receivers", [1, 2, 4])

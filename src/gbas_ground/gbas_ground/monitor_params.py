@@ -104,13 +104,13 @@ class TwoFrequencySection(Declared):
         "ccd_f", "min_clock_satellites", 3, "-", "others a receiver's clock is averaged from", low=1, high=35
     )
     receiver_covariance: tuple[float, ...] = parameter(
-        "ccd_f", "receiver_covariance", _triangle(StatisticCovariance().receiver), "(m/s)^2",
-        "of DF, DF other, IF carrier, upper triangle by rows: part of each receiver, divided by their number; "
-        "the default is the published bound of the codes", low=-1.0, high=1.0,
+        "ccd_f", "receiver_covariance", (0.0,) * 6, "(m/s)^2",
+        "of DF, DF other, IF carrier, upper triangle by rows: part of each receiver, divided by their number",
+        low=-1.0, high=1.0,
     )  # fmt: skip
     common_covariance: tuple[float, ...] = parameter(
         "ccd_f", "common_covariance", _triangle(StatisticCovariance().common), "(m/s)^2",
-        "likewise: part that the receivers share, never divided; the default is the published bound of the carrier",
+        "likewise: part that the receivers share, never divided; the default is the published bound",
         low=-1.0, high=1.0,
     )  # fmt: skip
     elevation_rad: tuple[float, ...] = parameter(

@@ -37,28 +37,12 @@ INDEPENDENT: Final = (0, 1, 3)
 """Places of the three independent statistics among the paper's four."""
 
 
+_ZERO: Final[Matrix3] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
 def _matrix3(values: FloatArray) -> Matrix3:
     first, second, third = (tuple(float(value) for value in row) for row in values)
     return first, second, third  # type: ignore[return-value]
-
-
-def carrier_part(covariance: FloatArray) -> FloatArray:
-    """Part of a covariance that comes with its last statistic, the carrier; what is left has no carrier in it.
-
-    Parameters
-    ----------
-    covariance : (n, n) array
-
-    Returns
-    -------
-    (n, n) array
-        Of rank one: the carrier's variance, its covariances, and what these explain of the other variances.
-    """
-    column = covariance[:, -1]
-    return np.asarray(np.outer(column, column) / covariance[-1, -1])
-
-
-_PUBLISHED: Final[FloatArray] = PRINTED_COVARIANCE[np.ix_(INDEPENDENT, INDEPENDENT)]
 
 
 def measurement_covariance(
@@ -119,15 +103,14 @@ class StatisticCovariance:
 
     Notes
     -----
-    The default is the paper's printed bound, of one receiver. The paper divides all of it by M. Divergence-free code
-    minus carrier has nothing in it but noise and multipath of one antenna, so that this part is each receiver's own.
-    The compensated carrier also has what all receivers see alike: satellite clock and orbit, the troposphere, and the
-    clock satellites' share of these; this part is common, and not divided. Uncertain, ours: how much of the carrier's
-    is a receiver's own is not known from one receiver. A station calibrates its own with :func:`calibrate`.
+    The default is the paper's printed bound on all receivers together, so more receivers do not make it smaller: how
+    much of it is common is not known of antennas nobody has measured. Two ordinary antennas a metre apart share so much
+    multipath that half of the codes' variance would alarm without a fault. A station calibrates its own with
+    :func:`calibrate`, which finds the common part; :func:`published_by_origin` divides what physics allows.
     """
 
-    receiver: Matrix3 = _matrix3(_PUBLISHED - carrier_part(_PUBLISHED))
-    common: Matrix3 = _matrix3(carrier_part(_PUBLISHED))
+    receiver: Matrix3 = _ZERO
+    common: Matrix3 = _matrix3(PRINTED_COVARIANCE[np.ix_(INDEPENDENT, INDEPENDENT)])
     elevation_rad: tuple[float, ...] = ()
     factor: tuple[Triple, ...] = ()
 
@@ -169,6 +152,18 @@ class StatisticCovariance:
         covariance = covariance * scale[:, :, np.newaxis] * scale[:, np.newaxis, :]
         covariance[:, 2, 2] *= 1.0 + 1.0 / np.maximum(clock_satellites, 1.0)
         return np.asarray(covariance)
+
+
+def published_by_origin() -> StatisticCovariance:
+    """The printed covariance with the codes' part as each receiver's own, for antennas whose multipath is independent.
+
+    Divergence-free code minus carrier has nothing in it but noise and multipath of one antenna. The compensated carrier
+    also has what all receivers see alike: satellite clock and orbit, and the troposphere; its variance, its covariances
+    and what these explain of the codes' variances are taken as common. The paper divides all by M.
+    """
+    printed = PRINTED_COVARIANCE[np.ix_(INDEPENDENT, INDEPENDENT)]
+    common = np.outer(printed[:, -1], printed[:, -1]) / printed[-1, -1]
+    return StatisticCovariance(receiver=_matrix3(printed - common), common=_matrix3(common))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -16,7 +16,7 @@ from gbas_core.divergence import GROUND, GROUND_SIGMA_MPS, GROUND_THRESHOLD_MPS
 from gbas_core.fault_modes import FAULT_MODES, fault_direction
 from gbas_core.record import FloatArray
 from gbas_core.signals import L1, L5
-from gbas_ground.monitors.divergence_covariance import INDEPENDENT, PRINTED_COVARIANCE, StatisticCovariance
+from gbas_ground.monitors.divergence_covariance import INDEPENDENT, PRINTED_COVARIANCE, published_by_origin
 from gbas_ground.monitors.two_frequency_divergence import threshold
 from gbas_studies.ccd.smoothed_error import StudyError
 
@@ -75,7 +75,7 @@ def monitor_for(
         Of the GAST D monitor, whose sigma and threshold are those of the mean over receivers [m/s].
     receivers : int
         M, averaged by the GAST F monitors: the form "paper" divides all of its covariance, the form "sound" only what
-        is each receiver's own (:class:`gbas_ground.monitors.divergence_covariance.StatisticCovariance`).
+        is each receiver's own (:func:`gbas_ground.monitors.divergence_covariance.published_by_origin`).
 
     Raises
     ------
@@ -105,9 +105,9 @@ def monitor_for(
 
 
 def _sound_covariance(receivers: int) -> FloatArray:
-    """Of the mean over receivers, with a known receiver clock, as the station has it [(m/s)^2]."""
+    """Of the mean over receivers, with a known receiver clock [(m/s)^2]."""
     one = np.ones(1)
-    return np.asarray(StatisticCovariance().at(one, receivers * one, np.inf * one)[0])
+    return np.asarray(published_by_origin().at(one, receivers * one, np.inf * one)[0])
 
 
 def direction_of(mode: str) -> FloatArray:

@@ -137,5 +137,6 @@ def receivers() -> Section:
         title="Averaging over receivers, Q/M", items=items,
         text="The paper divides all of Q by M. Of the sound form only what is each receiver's own is divided: the "
         "noise and multipath of the codes. Satellite clock, orbit and troposphere in the compensated carrier are alike "
-        "at all receivers; a station calibrates how much of each it has.",
+        "at all receivers. Antennas that stand close share multipath, too: a station divides only what it has "
+        "calibrated as its receivers' own, and nothing by default.",
     )  # fmt: skip
