@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import front_screening
 import numpy as np
 import pytest
 
+import front_screening
 from gbas_bringup.resources import named_config
 from gbas_core.satellites import N_SATS, SAT_INDEX
 from gbas_ground.ionosphere.geometry_screening import judge, least_safe, sent_sigma_m, subsets_of

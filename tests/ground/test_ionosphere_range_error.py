@@ -71,7 +71,7 @@ def test_an_aircraft_is_not_beyond_the_table():
 
 @pytest.mark.parametrize(("speed", "width"), [(60.0, 25e3), (100.0, 25e3), (750.0, 25e3), (200.0, 60e3)])
 def test_how_long_the_divergence_monitor_keeps_a_satellite_out(speed, width):
-    """Against its two filters, step by step at 2 Hz; half a step of 0.5 s and a second of the grid are the tolerance."""
+    """Against its two filters, step by step; half a step of 0.5 s and the second of the grid are the tolerance."""
     gradient, weight = 425e-6, 0.5 / 30.0
     time = np.arange(-width / speed, 900.0, 0.5)
     first = second = last = 0.0
