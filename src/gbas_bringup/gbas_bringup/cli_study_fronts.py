@@ -109,18 +109,28 @@ def plan_of(
     for text in protections or (NO_THREAT, "own"):
         name, _, keys = text.partition(":")
         section = own if name == "own" else {"threat_model": name}
-        given = dict(each.split("=", 1) for each in keys.split(",") if "=" in each)
+        given = {key: _value(value) for key, _, value in (each.partition("=") for each in keys.split(",") if each)}
+        # the distance of use belongs to the protection: so far it is screened
+        distance = {key: given.pop(key) for key in ("max_use_distance_m",) if key in given}
         stations[text] = GroundParams.from_mapping(
-            ground | {"ionosphere": section | {key: _value(value) for key, value in given.items()}},
+            ground | {"ionosphere": section | given, "station": dict(ground["station"]) | distance},
             source=f"--protection {text}",
         )
     drawn = threat or own.get("threat_model", NO_THREAT)
     if drawn not in THREATS:
         raise GbasError(f"--threat {drawn!r} is not one of {', '.join(THREATS)}")
     flight = replace(world.flight, intercept_distance_m=within_m + 1_000.0, level_time_s=_LEVEL_S)
+    shorter_s = round(world.length_s - flight.duration_s, 1)  # it ends when the scenario's does
     return Plan(
         world=replace(
-            world, flight=flight, systems=systems, faults=(), fronts=(), interval_s=interval_s or world.interval_s
+            world,
+            flight=flight,
+            systems=systems,
+            faults=(),
+            fronts=(),
+            duration_s=None,
+            interval_s=interval_s or world.interval_s,
+            start_tow_s=world.start_tow_s + shorter_s,
         ),
         stations=stations,
         aircraft=AirborneParams.from_mapping(dict(sections["airborne"]) | {"systems": systems}),

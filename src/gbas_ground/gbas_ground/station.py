@@ -42,6 +42,7 @@ from gbas_ground.ephemerides import EphemerisState, initial_ephemerides
 from gbas_ground.event_log import EventLog
 from gbas_ground.executive import advance, exclude, release
 from gbas_ground.geometry import Expected, Site, expected, site_of
+from gbas_ground.ionosphere.position_errors import compile_ahead
 from gbas_ground.ionosphere.protection import (
     IonosphereState,
     Protection,
@@ -182,6 +183,8 @@ class MonitorState:
 
 def initial_monitor_state(params: GroundParams) -> MonitorState:
     """A station that has seen nothing."""
+    if params.ionosphere.protects:
+        compile_ahead()
     return MonitorState(
         key=None,
         refused=0,

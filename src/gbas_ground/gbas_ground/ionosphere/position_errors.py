@@ -8,6 +8,7 @@ Source: as :func:`gbas_core.wls.projection_matrix`, ICAO Annex 10 Vol. I, App. B
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -170,3 +171,13 @@ def geometries(
         subsets, limit_m, tolerable_m, k_ffmd, k_noise, affected, first_only, level, wrong,
     )  # fmt: skip
     return Geometries(level, wrong, int(not_safe))
+
+
+@lru_cache(maxsize=1)
+def compile_ahead() -> None:
+    """Compile now, not at the first epoch that is screened; once a machine it takes some seconds."""
+    ones, flags = np.ones((1, 1)), np.ones((1, 1), dtype=bool)
+    geometries(
+        np.ones((1, 3, 1)), np.ones(1), ones, ones, ones, flags, flags, np.ones((2, 1)), np.ones((2, 1)),
+        k_ffmd=1.0, k_noise=1.0, affected=1,
+    )  # fmt: skip

@@ -71,8 +71,10 @@ class Protection:
     available: bool = True
 
     def inflated_m(self, sigma_m: FloatArray) -> FloatArray:
-        """Broadcast sigmas, ``(N,)`` [m]."""
-        return sigma_m if self.factor == 0.0 else sent_sigma_m(sigma_m, self.shape_m, self.factor)
+        """Broadcast sigmas, ``(N,)`` [m]; none for what is not protected."""
+        if self.factor == 0.0:
+            return np.where(np.isnan(self.shape_m), np.nan, sigma_m)
+        return sent_sigma_m(sigma_m, self.shape_m, self.factor)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

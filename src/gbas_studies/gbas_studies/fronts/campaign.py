@@ -209,10 +209,9 @@ def _worst_line(
             direction_rad=outward, speed_mps=speed, start_m=rng.uniform(_NEAREST_M, 1.5 * speed * 100.0), ahead=True
         )
     if kind == "with the aircraft":
-        return _Line(
-            direction_rad=outward + math.pi, speed_mps=rng.uniform(50.0, 90.0), start_m=-_NEAREST_M - rng.uniform(0.0, 500.0),
-            ahead=False,
-        )  # fmt: skip
+        start_m = -_NEAREST_M - rng.uniform(0.0, 500.0)
+        inward = outward + math.pi
+        return _Line(direction_rad=inward, speed_mps=rng.uniform(50.0, 90.0), start_m=start_m, ahead=False)
     speed = float(rng.choice([0.0, rng.uniform(0.0, 15.0)]))
     return _Line(direction_rad=outward, speed_mps=speed, start_m=_NEAREST_M + rng.uniform(-900.0, 600.0), ahead=True)
 
@@ -228,7 +227,7 @@ def _edges(kind: str, rng: np.random.Generator, s: FloatArray, line: _Line) -> l
 def _front(
     line: _Line, slope: float, width_m: float, delayed_ahead: bool, since_s: float, satellite: str
 ) -> WedgeFront:
-    """A front whose slope begins at the line, ahead of it or behind, with the delay on the side it is meant to be on."""
+    """A front whose slope begins at the line, ahead of it or behind, with the delay on the side it is meant to be."""
     # trailing: the delay grows from the start onwards; leading: it grows from the start backwards
     if line.ahead:
         start_m = line.start_m if delayed_ahead else line.start_m + width_m

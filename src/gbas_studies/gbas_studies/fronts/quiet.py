@@ -54,7 +54,7 @@ class Observed:
     @property
     def since_s(self) -> FloatArray:
         """Times of the epochs since the start, (T,) [s]."""
-        return np.arange(len(self.epochs)) * self.world.params.interval_s
+        return np.asarray(np.arange(len(self.epochs)) * self.world.params.interval_s, dtype=np.float64)
 
 
 def observe(params: WorldParams) -> Observed:
@@ -178,7 +178,7 @@ def fly(
 def _los(azimuth_rad: FloatArray, elevation_rad: FloatArray, approach: FinalApproach) -> FloatArray:
     """Unit vectors, forward, left and up, (3, N); 0 where there is none."""
     turn, level = azimuth_rad - approach.course_rad, np.cos(elevation_rad)
-    return np.nan_to_num(np.stack([level * np.cos(turn), -level * np.sin(turn), np.sin(elevation_rad)]))
+    return np.asarray(np.nan_to_num(np.stack([level * np.cos(turn), -level * np.sin(turn), np.sin(elevation_rad)])))
 
 
 def _recorded(observed: Observed, fronts: Sequence[WedgeFront]) -> Iterator[RecordedEpoch]:

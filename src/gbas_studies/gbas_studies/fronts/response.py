@@ -49,7 +49,9 @@ def smoothed_m(delay: FloatArray, tracked: BoolArray, interval_s: float, tau_s: 
     Source: as :func:`gbas_core.smoothing.smooth_step` ("variable").
     """
     shape = delay.shape
-    columns = _smoothed(delay.reshape(shape[0], -1), tracked.reshape(shape[0], -1), interval_s / tau_s)
+    columns = _smoothed(  # type: ignore[no-untyped-call]  # compiled
+        delay.reshape(shape[0], -1), tracked.reshape(shape[0], -1), interval_s / tau_s
+    )
     return np.asarray(columns).reshape(shape)
 
 
