@@ -215,7 +215,7 @@ def _settings(params: GroundParams) -> _Settings:
         gradient=gradient,
         gradient_required=sections.gradient.required or params.gast_d,
         ephemeris=sections.ephemeris.params(gradient.bands),
-        power=sections.power.params(params.max_gap_s),
+        power=sections.expected_power.params(params.max_gap_s),
         site=gradient_site(params.receiver_positions_m(), params.reference_point_m(), gradient),
         troposphere=Troposphere(refractivity=params.refractivity, scale_height_m=params.scale_height_m),
     )
@@ -250,7 +250,7 @@ def watch(state: WatchState, seen: Seen, params: GroundParams) -> tuple[WatchSta
     gradient = _gradient(differences, seen, settings, exclude=sections.gradient.exclude)
     ephemeris, orbit = _ephemeris(state.ephemeris, differences, seen, settings, exclude=sections.ephemeris.exclude)
     power, expectation = _power(
-        state.power, seen, settings, exclude=sections.power.exclude, required=params.require_cn0
+        state.power, seen, settings, exclude=sections.expected_power.exclude, required=params.require_cn0
     )
     parts = (_common_slip(seen), divergence, two_frequency, carrier, gradient, orbit, expectation)
     ready = np.ones_like(seen.due)
