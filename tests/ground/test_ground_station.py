@@ -14,7 +14,6 @@ from gbas_core.satellites import IS_GALILEO, IS_GPS, N_SATS, SAT_INDEX
 from gbas_core.signals import L1, SPEED_OF_LIGHT_MPS
 from gbas_ground.causes import ExclusionCause
 from gbas_ground.monitor_params import ExpectedPowerSection, MonitorParams, PowerSection
-from gbas_ground.params import GroundParams
 from gbas_ground.station import RESTART_AFTER_REFUSED, GroundEpoch, GroundStation
 from gbas_msgs_py.records import GROUND_MONITORS, ChannelState, MonitorState
 from ground_runs import half_seconds, params, run, watching_monitors
@@ -288,8 +287,6 @@ def test_one_name_is_one_monitor():
     assert told(**power) == ({"expected_power"}, False)
     assert told(**expected) == ({"signal_power"}, False)
     assert told(**power, **expected) == (set(), True)
-    with pytest.raises(ValueError, match=r"power\.minimum_l1_dbhz"):
-        GroundParams.from_mapping({"power": {"minimum_l1_dbhz": [30.0]}}, source="station.yaml")
 
 
 def test_files_without_cn0_are_used_when_told_so():
