@@ -7,6 +7,7 @@ PATHS := PATH="$(CURDIR)/$(VENV)/bin:$$PATH"
 RUN := env -u PYTHONPATH -u PYTHONHOME $(PATHS) AMENT_PREFIX_PATH="$(CURDIR)/$(VENV)"
 COLCON := env -u PYTHONPATH -u PYTHONHOME -u AMENT_PREFIX_PATH $(PATHS) COLCON_DEFAULTS_FILE=colcon_defaults.yaml colcon
 ARGS ?=
+SEED := $(or $(SEED),$(shell date +%s))
 
 ifndef GBAS_DATA
 ifneq ($(wildcard ../shared/data),)
@@ -32,8 +33,9 @@ demo: $(READY)  ## fly one approach, write a bag and a report, print where they 
 test: $(READY)  ## run every test but the campaigns (ARGS="-k name" to choose)
 	@$(RUN) python -m pytest -n 2 --dist loadfile $(ARGS)
 
-campaign: $(READY)  ## run the long tests
-	@$(RUN) python -m pytest -m campaign $(ARGS)
+campaign: $(READY)  ## run the long tests, and look for new examples (SEED=n repeats a run)
+	@echo "seed of the examples: $(SEED); again with: make campaign SEED=$(SEED)"
+	@$(RUN) python -m pytest -m "campaign or hypothesis" --hypothesis-profile explore --hypothesis-seed $(SEED) $(ARGS)
 
 bag: $(READY)  ## record the repository's bag anew (bags/README.md says when)
 	rm -rf out/short

@@ -13,8 +13,10 @@ from hypothesis import settings
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
-# A busy machine must not turn a slow example into a failure.
-settings.register_profile("suite", deadline=None)
+# A busy machine must not turn a slow example into a failure, nor a new example a run of tests that nobody touched:
+# examples are the same in every run, and `make campaign` looks for others.
+settings.register_profile("suite", deadline=None, derandomize=True)
+settings.register_profile("explore", deadline=None, max_examples=1000, print_blob=True)
 settings.load_profile("suite")
 
 

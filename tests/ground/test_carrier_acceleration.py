@@ -12,17 +12,19 @@ from gbas_core.satellites import N_SATS
 from gbas_core.signals import L1, L2, L5
 from gbas_ground.geometry import site_of
 from gbas_ground.monitors.carrier_acceleration import (
+    FEWEST_OTHERS,
     CarrierAccelerationParams,
     carrier_acceleration_step,
     detectable_fault,
     fault_response,
+    fewest_others,
     initial_carrier_acceleration,
 )
 from gbas_ground.monitors.double_difference import Troposphere, baselines_of, carrier_residual_m
 from loop_acceleration import loop_statistics
-from monitor_scenes import recorded_pair
+from monitor_scenes import STATION, STATION_GAP_S, recorded_pair
 
-PARAMS = CarrierAccelerationParams()
+PARAMS = STATION.acceleration.params(STATION_GAP_S)
 BANDS, T = 2, 0.5
 HERE = np.isin(np.arange(N_SATS), [0, 3, 5, 9, 12, 17, 20, 30, 33, 37, 40, 45, 51, 60])
 ELEVATION = np.where(HERE, np.radians(8.0 + 1.1 * np.arange(N_SATS)), np.nan)
@@ -260,7 +262,7 @@ def test_a_new_ephemeris_is_no_step():
 @pytest.mark.parametrize(("name", "bands"), [("upc1_upc2", (L1, L2)), ("mosaic_base_rover", (L1, L5))])
 def test_recorded_pairs_have_no_false_alarm(data_dir, name, bands):
     station, epochs = recorded_pair(name, data_dir, 500)
-    params = CarrierAccelerationParams(bands=bands, interval_s=1.0)
+    params = replace(PARAMS, bands=bands, interval_s=1.0)
     site = site_of(station).positions_m
     baselines, air = baselines_of(site[:2], site[2]), Troposphere(refractivity=330.0, scale_height_m=7900.0)
     state, before, judged, largest = initial_carrier_acceleration(2, params), None, 0, 0.0
@@ -306,3 +308,15 @@ def test_detection_is_far_below_what_hurts():
 def test_bad_parameters(changes, word):
     with pytest.raises(ValueError, match=word):
         CarrierAccelerationParams(**changes)
+
+
+def test_fewest_others_follow_from_the_budget():
+    """One fault among all others has to be reckoned with, two at once not: two are left when the faulty one is out.
+
+    In 15 s: 35 others at 1e-5 an hour make 1.5e-6, more than 1e-8; two of them 1e-12, less.
+    """
+    assert (
+        fewest_others(1e-8) == FEWEST_OTHERS == PARAMS.min_satellites == CarrierAccelerationParams().min_satellites == 3
+    )
+    assert fewest_others(1e-5) == 2
+    assert fewest_others(1e-13) == 4

@@ -29,10 +29,10 @@ from gbas_ground.monitors.ephemeris_residual import (
     site_decorrelation,
 )
 from loop_decorrelation import scanned_decorrelation
-from monitor_scenes import BRAUNSCHWEIG_M, recorded_pair
+from monitor_scenes import BRAUNSCHWEIG_M, STATION, recorded_pair, station_gradient
 from synthetic_ranges import LATITUDE_RAD, LONGITUDE_RAD, TOW_S, WEEK, constellation
 
-PARAMS = EphemerisResidualParams()
+PARAMS = STATION.ephemeris.params(station_gradient().bands)
 NOISE = CarrierNoise()
 SITE = baselines_of(BRAUNSCHWEIG_M, BRAUNSCHWEIG_M[0])
 HERE = np.arange(N_SATS) < 9
@@ -235,26 +235,27 @@ def test_missing_is_not_good():
     value[1:, :, 5] = np.nan  # one baseline left: looked at
     value[:, 1, 6] = np.nan  # L1 alone: looked at
     gone = replace(one, residual_m=value, sigma_m=np.where(np.isnan(value), np.nan, 0.005))
-    _, results = run([one, gone])
+    required = replace(PARAMS, required=True)
+    _, results = run([one, gone], params=required)
     assert np.flatnonzero(results[1].failed).tolist() == [3]
-    _, results = run([one, gone], params=replace(PARAMS, required=False))
+    _, results = run([one, gone])
     assert not results[1].failed.any()
     nothing = replace(one, residual_m=np.full(SHAPE, np.nan), sigma_m=np.full(SHAPE, np.nan))
-    _, results = run([nothing])
+    _, results = run([nothing], params=required)
     assert (results[0].failed == HERE).all()
     single = baselines_of(BRAUNSCHWEIG_M[:1], BRAUNSCHWEIG_M[0])
     empty = np.zeros((0, 2, N_SATS))
     none = DoubleDifferences(
         residual_m=empty, sigma_m=empty, nominal_sigma_m=empty, reference=np.zeros(empty.shape, dtype=np.int64)
     )
-    _, results = run([none], site=single)
+    _, results = run([none], site=single, params=required)
     assert (results[0].failed == HERE).all()
 
 
 @pytest.mark.parametrize(("name", "bands"), [("upc1_upc2", (L1, L2)), ("mosaic_base_rover", (L1, L5))])
 def test_recorded_pairs_have_no_false_alarm(data_dir, name, bands):
     station, epochs = recorded_pair(name, data_dir, 400)
-    params = EphemerisResidualParams(bands=bands)
+    params = replace(PARAMS, bands=bands)
     site = site_of(station).positions_m
     baselines, air = baselines_of(site[:2], site[2]), Troposphere(refractivity=330.0, scale_height_m=7900.0)
     state, largest = initial_ephemeris_residual(1, params), 0.0

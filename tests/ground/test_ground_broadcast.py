@@ -10,9 +10,9 @@ import pytest
 from gbas_core.approach import FinalApproach
 from gbas_core.gpstime import modified_z_count_s
 from gbas_core.satellites import IS_GPS, RANGING_SOURCE_ID, SOURCE_ID_INDEX
-from gbas_ground.broadcast import broadcast_frame, empty_integrity
+from gbas_ground.broadcast import BroadcastState, broadcast_frame, empty_integrity
 from gbas_ground.params import GCID_UNHEALTHY
-from gbas_ground.station import GroundStation, initial_broadcast_state
+from gbas_ground.station import GroundStation
 from gbas_msgs_py.records import ChannelState
 from gbas_msgs_py.vdb.messages import Type1, Type2, Type4, Type11
 from gbas_msgs_py.vdb.receive import decode_burst
@@ -157,9 +157,7 @@ def test_incomplete_satellite_is_not_sent(full, field, value):
     satellite = int(np.flatnonzero(integrity.state == ChannelState.USABLE)[2])
     values = getattr(integrity, field).copy()
     values[satellite] = value
-    _, bursts = GroundStation.broadcast(
-        initial_broadcast_state(station), dataclasses.replace(integrity, **{field: values}), station
-    )
+    _, bursts = GroundStation.broadcast(BroadcastState(), dataclasses.replace(integrity, **{field: values}), station)
     sent = {each.ranging_source_id for message in messages(bursts, Type1) for each in message.measurements}
     assert int(RANGING_SOURCE_ID[satellite]) not in sent
     assert len(sent) == (integrity.state == ChannelState.USABLE).sum() - 1
@@ -171,9 +169,7 @@ def test_b_value_beyond_the_field_is_not_sent(full):
     satellite = int(np.flatnonzero(integrity.state == ChannelState.USABLE)[0])
     b = integrity.b_m.copy()
     b[1, satellite] = 6.4
-    _, bursts = GroundStation.broadcast(
-        initial_broadcast_state(station), dataclasses.replace(integrity, b_m=b), station
-    )
+    _, bursts = GroundStation.broadcast(BroadcastState(), dataclasses.replace(integrity, b_m=b), station)
     sent = {each.ranging_source_id for message in messages(bursts, Type1) for each in message.measurements}
     assert int(RANGING_SOURCE_ID[satellite]) not in sent
 
@@ -182,7 +178,7 @@ def test_b_value_beyond_the_field_is_not_sent(full):
 def test_too_few_receivers_send_nothing(full, n_receivers):
     station, out = full
     integrity = dataclasses.replace(out.integrity[-1], n_receivers=n_receivers)
-    _, bursts = broadcast_frame(initial_broadcast_state(station), integrity, station)
+    _, bursts = broadcast_frame(BroadcastState(), integrity, station)
     assert all(message.measurements == () for message in messages(bursts, Type1))
     assert {message.gcid for message in messages(bursts, Type2)} == {GCID_UNHEALTHY}
 
@@ -198,12 +194,12 @@ def test_stale_epoch_gives_no_frame(full):
 def test_epoch_between_frames_gives_no_frame(full):
     station, out = full
     odd = dataclasses.replace(out.integrity[-1], tow_s=out.integrity[-1].tow_s + 0.2)
-    assert broadcast_frame(initial_broadcast_state(station), odd, station)[1] == ()
+    assert broadcast_frame(BroadcastState(), odd, station)[1] == ()
 
 
 def test_frame_without_integrity_is_a_live_but_empty_station():
     station = params(2)
-    _, bursts = broadcast_frame(initial_broadcast_state(station), empty_integrity(WEEK, TOW_S), station)
+    _, bursts = broadcast_frame(BroadcastState(), empty_integrity(WEEK, TOW_S), station)
     assert messages(bursts, Type1)[0].measurements == ()
     assert messages(bursts, Type2)[0].gcid == GCID_UNHEALTHY
 

@@ -64,6 +64,7 @@ def test_dotted_keys_and_ros_arrays_mean_the_same():
     ("sections", "expected"),
     [
         ({"station": {"id": "edve"}}, "station.id = 'edve'"),
+        ({"power": {"minimum_l1_dbhz": [30.0]}}, "power.minimum_l1_dbhz"),
         ({"station": {"gcid": 5}}, "station.gcid = 5 is not one of 1, 2, 3, 4, 7"),
         ({"station": {"gcid": True}}, "station.gcid = True"),
         ({"station": {"latitude_deg": 91.0}}, "station.latitude_deg = 91 is not within -90 to 90 deg"),

@@ -13,8 +13,9 @@ from gbas_core.observations import ObservationEpoch
 from gbas_core.satellites import IS_GALILEO, IS_GPS, N_SATS, SAT_INDEX
 from gbas_core.signals import L1, SPEED_OF_LIGHT_MPS
 from gbas_ground.causes import ExclusionCause
+from gbas_ground.monitor_params import ExpectedPowerSection, MonitorParams, PowerSection
 from gbas_ground.station import RESTART_AFTER_REFUSED, GroundEpoch, GroundStation
-from gbas_msgs_py.records import ChannelState
+from gbas_msgs_py.records import GROUND_MONITORS, ChannelState, MonitorState
 from ground_runs import half_seconds, params, run, watching_monitors
 from synthetic_ranges import TOW_S, WEEK, constellation, truth
 
@@ -263,6 +264,29 @@ def test_weak_signal_is_not_used(missing_cn0):
     out = run(truth(3), params(3), half_seconds(40), change=weak)
     assert out.told("signal_power") == [(10.0, "exclusion", "rr3/G05")]
     assert out.integrity[-1].receiver_used[:, SAT_INDEX["G05"]].tolist()[:3] == [1.0, 1.0, 0.0]
+
+
+def test_one_name_is_one_monitor():
+    """What the monitors' table calls `power` is what the section `power` tells to watch only, and no other."""
+
+    def weak(second, observed):
+        if second >= 10.0:
+            observed[2].cn0_dbhz[L1, SAT_INDEX["G05"]] = 25.0
+        return observed
+
+    def told(**sections):
+        station = params(4, monitors=dataclasses.replace(MonitorParams(), **sections))
+        out = run(truth(4), station, half_seconds(40), change=weak)
+        rows = [GROUND_MONITORS.index(name) for name in ("power", "expected_power")]
+        assert (out.statistics[-1].state[rows, SAT_INDEX["G05"]] == MonitorState.FAILED).any()
+        causes = {cause for cause in ("signal_power", "expected_power") if out.told(cause)}
+        return causes, out.integrity[-1].receiver_used[2, SAT_INDEX["G05"]] == 1.0
+
+    power, expected = {"power": PowerSection(exclude=False)}, {"expected_power": ExpectedPowerSection(exclude=False)}
+    assert told() == ({"signal_power"}, False)  # the averaged one is slower, and does not look at what is out
+    assert told(**power) == ({"expected_power"}, False)
+    assert told(**expected) == ({"signal_power"}, False)
+    assert told(**power, **expected) == (set(), True)
 
 
 def test_files_without_cn0_are_used_when_told_so():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -41,10 +43,11 @@ from gbas_sim.presets import receiver_preset
 from gbas_sim.troposphere import Troposphere as SimulatedTroposphere
 from gbas_sim.world import World, WorldParams, open_orbits
 from loop_double_difference import dense, loop_double_differences
-from monitor_scenes import BRAUNSCHWEIG_M, RUNWAY_RAD, recorded_pair, simulated, station_of
+from monitor_scenes import BRAUNSCHWEIG_M, RUNWAY_RAD, recorded_pair, simulated, station_gradient, station_of
 
 AIR = Troposphere(refractivity=330.0, scale_height_m=7900.0)
-PARAMS = IonosphereGradientParams(runway_bearing_rad=(RUNWAY_RAD,))
+PARAMS = station_gradient()
+REQUIRED = replace(PARAMS, required=True)
 SITE = gradient_site(BRAUNSCHWEIG_M, BRAUNSCHWEIG_M[0], PARAMS)
 HERE = np.isin(np.arange(N_SATS), [0, 5, 7, 11, 15, 17, 20, 21, 32, 37, 38, 39, 45, 46, 48, 54])
 ELEVATION = np.where(HERE, np.radians(40.0 + 0.7 * np.arange(N_SATS)), np.nan)
@@ -314,18 +317,17 @@ def test_missing_is_not_good():
     residual[..., 5] = np.nan  # not measured at all
     residual[1:, :, 7] = np.nan  # one receiver only
     residual[:, 1, 11] = np.nan  # L1 only: monitored all the same
-    _, result = verdict(residual, site)
+    _, result = verdict(residual, site, params=REQUIRED)
     assert np.flatnonzero(result.verdict.failed).tolist() == [5, 7]
     assert not result.monitored[[5, 7]].any()
     assert result.monitored[11]
-    optional = IonosphereGradientParams(runway_bearing_rad=(RUNWAY_RAD,), required=False)
-    assert not verdict(residual, site, params=optional)[1].verdict.failed.any()
-    _, result = verdict(np.full_like(residual, np.nan), site)
+    assert not verdict(residual, site)[1].verdict.failed.any()
+    _, result = verdict(np.full_like(residual, np.nan), site, params=REQUIRED)
     assert (result.verdict.failed == HERE).all()
     assert (result.coverage == 0.0).all()
     # A constellation with one satellite has nothing to compare it with.
     alone = HERE & ((np.arange(N_SATS) < 32) | (np.arange(N_SATS) == 37))
-    _, result = verdict(np.where(alone, made_up(rng, {})[0], np.nan), site, due=alone)
+    _, result = verdict(np.where(alone, made_up(rng, {})[0], np.nan), site, due=alone, params=REQUIRED)
     assert np.flatnonzero(result.verdict.failed).tolist() == [37]
 
 
@@ -336,7 +338,7 @@ def test_two_receivers_and_one():
     assert len(site.baselines) == 1
     assert np.flatnonzero(result.verdict.failed).tolist() == [20]
     residual, site = made_up(rng, {}, receivers=1)
-    _, result = verdict(residual, site)
+    _, result = verdict(residual, site, params=REQUIRED)
     assert (result.verdict.failed == HERE).all()
     assert not result.monitored.any()
 

@@ -9,7 +9,6 @@ from gbas_core.frames import geodetic_from_ecef, rot_enu_ecef
 from gbas_core.satellites import SAT_INDEX
 from gbas_core.signals import L1, L5
 from gbas_ground.monitors.carrier_acceleration import (
-    CarrierAccelerationParams,
     carrier_acceleration_step,
     initial_carrier_acceleration,
 )
@@ -20,14 +19,12 @@ from gbas_ground.monitors.double_difference import (
     reference_satellites,
 )
 from gbas_ground.monitors.ephemeris_residual import (
-    EphemerisResidualParams,
     ephemeris_residual_step,
     initial_ephemeris_residual,
     site_decorrelation,
 )
-from gbas_ground.monitors.ionosphere_gradient import IonosphereGradientParams, check_ionosphere_gradient, gradient_site
+from gbas_ground.monitors.ionosphere_gradient import check_ionosphere_gradient, gradient_site
 from gbas_ground.monitors.power_expectation import (
-    PowerExpectationParams,
     initial_power_expectation,
     power_expectation_step,
 )
@@ -36,7 +33,7 @@ from gbas_sim.fronts import WedgeFront
 from gbas_sim.presets import receiver_preset
 from gbas_sim.troposphere import Troposphere as SimulatedTroposphere
 from gbas_sim.world import World, WorldParams
-from monitor_scenes import BRAUNSCHWEIG_M, RUNWAY_RAD, simulated, station_of
+from monitor_scenes import BRAUNSCHWEIG_M, RUNWAY_RAD, STATION, STATION_GAP_S, simulated, station_gradient, station_of
 
 AIR = Troposphere(refractivity=330.0, scale_height_m=7900.0)
 BANDS, T, SETTLED, TIME_TO_ALERT_S = (L1, L5), 0.5, 12, 1.5
@@ -58,9 +55,13 @@ def verdicts(*, seconds=12.0, seed=1, **threats):
         )
     )  # fmt: skip
     epochs = simulated(world, world.ephemeris, station_of(BRAUNSCHWEIG_M, "GE"))
-    gradient = IonosphereGradientParams(runway_bearing_rad=(float(RUNWAY_RAD),))
+    gradient = station_gradient()
     site = gradient_site(BRAUNSCHWEIG_M, BRAUNSCHWEIG_M[0], gradient)
-    settings = CarrierAccelerationParams(), PowerExpectationParams(), EphemerisResidualParams()
+    settings = (
+        STATION.acceleration.params(STATION_GAP_S),
+        STATION.expected_power.params(STATION_GAP_S),
+        STATION.ephemeris.params(gradient.bands),
+    )
     moved = initial_carrier_acceleration(4, settings[0])
     power = initial_power_expectation(4, settings[1])
     orbit = initial_ephemeris_residual(len(site.baselines), settings[2])
@@ -149,9 +150,9 @@ def test_an_orbit_beyond_the_minimum_detectable_error():
     found, epochs = verdicts(seconds=7.0)
     satellite = SAT_INDEX["E08"]
     elevation, azimuth = (each[[satellite]] for each in (epochs[-1].elevation_rad, epochs[-1].azimuth_rad))
-    gradient = IonosphereGradientParams(runway_bearing_rad=(float(RUNWAY_RAD),))
+    gradient = station_gradient()
     baselines = gradient_site(BRAUNSCHWEIG_M, BRAUNSCHWEIG_M[0], gradient).baselines
-    p = site_decorrelation(baselines, elevation, azimuth, gradient.noise, EphemerisResidualParams())
+    p = site_decorrelation(baselines, elevation, azimuth, gradient.noise, STATION.ephemeris.params(gradient.bands))
     error_m = 1.3 * float(p[0]) * float(epochs[-1].range_m[0, satellite])
     # along and cross are not quite across the line of sight: 1.3 allows for 40 degrees
     assert 1000.0 < error_m < 5000.0

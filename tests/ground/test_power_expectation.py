@@ -17,9 +17,9 @@ from gbas_ground.monitors.power_expectation import (
     power_expectation_step,
 )
 from loop_power import loop_average, loop_minimum, mean_of
-from monitor_scenes import recorded_pair
+from monitor_scenes import STATION, STATION_GAP_S, recorded_pair
 
-PARAMS = PowerExpectationParams()
+PARAMS = STATION.expected_power.params(STATION_GAP_S)
 HERE = np.isin(np.arange(N_SATS), [0, 3, 5, 9, 12, 17, 33, 37, 40, 45, 60])
 ELEVATION = np.where(HERE, np.radians(6.0 + 1.3 * np.arange(N_SATS)), np.nan)
 DUE = np.broadcast_to(HERE, (4, N_SATS))

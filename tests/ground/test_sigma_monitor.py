@@ -20,8 +20,9 @@ from gbas_ground.monitors.sigma_monitor import (
     window_weights,
 )
 from loop_sigma import correlated, dense_distribution, stored_estimates
+from monitor_scenes import STATION
 
-PARAMS = SigmaMonitorParams()
+PARAMS = STATION.sigma.params()
 HERE = np.arange(N_SATS) < 10
 STEP_S = 50.0
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -200,17 +199,3 @@ def test_every_recorded_ephemeris_has_a_crc(data_dir: Path) -> None:
             seen[(int(index), ephemeris.iod[index], ephemeris.toe_tow_s[index])] = crcs[index]
     # Different ephemerides have different CRCs, but for one chance in 65536 each.
     assert len(set(seen.values())) > 0.95 * len(seen)
-
-
-def test_thirty_satellites_are_quick() -> None:
-    # Runs when an ephemeris is received. 3 ms is the budget; a generous factor for a busy machine.
-    arrays = {item.name: np.full(N_SATS, 5 * item.lsb) for item in GPS_FIELDS}
-    ephemeris = Ephemeris(gps_week=2300, tow_s=0.0, **arrays)
-    ephemeris_crcs(ephemeris)
-    best = math.inf
-    for _ in range(5):
-        start = time.perf_counter()
-        crcs = ephemeris_crcs(ephemeris)
-        best = min(best, time.perf_counter() - start)
-    assert np.isfinite(crcs).sum() == 32
-    assert best < 10e-3

@@ -19,6 +19,8 @@ from gbas_core.satellites import satellites_of
 from gbas_core.signals import L1, SPEED_OF_LIGHT_MPS
 from gbas_ground import ephemerides
 from gbas_ground.geometry import expected, site_of
+from gbas_ground.monitor_params import MonitorParams
+from gbas_ground.monitors.ionosphere_gradient import IonosphereGradientParams
 from gbas_ground.params import GroundParams
 from gbas_ground.tracking import TrackGroup, initial_tracking, stack, track
 from gbas_msgs_py.joining import ReceptionQueue
@@ -124,3 +126,13 @@ def simulated(epochs: Iterable[SimulatedEpoch], ephemeris: Ephemeris, params: Gr
     """Epochs of a simulated world; its broadcast is known from the start."""
     rows = ((each.key, each.ground, (ephemeris,) if number == 0 else ()) for number, each in enumerate(epochs))
     return list(monitor_epochs(rows, params))
+
+
+STATION = MonitorParams()
+"""What a station's monitors are set to that sets nothing else."""
+STATION_GAP_S = 3.5  # smoothing.max_gap_s
+
+
+def station_gradient() -> IonosphereGradientParams:
+    """The station's gradient monitor, along the runway; its carrier noise is that of the station."""
+    return STATION.gradient.params((float(RUNWAY_RAD),), STATION.carrier_noise.params())

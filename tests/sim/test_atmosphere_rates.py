@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 
 import numpy as np
 import pytest
@@ -17,7 +16,6 @@ from gbas_sim.flight import StraightIn
 from gbas_sim.fronts import PlasmaBubble, WedgeFront
 from gbas_sim.ionosphere import Ionosphere
 from gbas_sim.paths import SignalPaths
-from gbas_sim.scintillation import Scintillation
 from gbas_sim.troposphere import Troposphere, WeatherBox
 
 WEEK, START_S = 2400, 216_000.0
@@ -91,21 +89,3 @@ def test_instants_together(name):
         single = EFFECTS[name].delay(approach_paths(since_s))
         np.testing.assert_allclose(together.delay_m[number], single.delay_m, rtol=1e-9, atol=1e-9)
         np.testing.assert_allclose(together.rate_mps[number], single.rate_mps, rtol=1e-9, atol=1e-9)
-
-
-@pytest.mark.parametrize("name", [*EFFECTS, "scintillation"])
-def test_cost(name):
-    """0.2 ms an epoch on an idle core with the geometry made anew; the bound leaves room for slow and busy ones."""
-    made = approach_paths(400.0)
-    values = {key: getattr(made, key) for key in SignalPaths.__dataclass_fields__}
-    scintillation = Scintillation(seed=3)
-    best_s = math.inf
-    for _ in range(50):
-        begun = time.perf_counter()
-        now = SignalPaths(**values)
-        if name == "scintillation":
-            scintillation.epoch(now, (0, 1, 2, 3, 100)).fading_db()
-        else:
-            EFFECTS[name].delay(now)
-        best_s = min(best_s, time.perf_counter() - begun)
-    assert best_s < 1e-3

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 import pytest
 
@@ -202,15 +200,6 @@ def test_error_of_the_ionosphere_free_range():
     assert cmc_rate("Code L1", "IF") == pytest.approx(2.2606, abs=5e-5)
     assert cmc_rate("Code L5", "IF") == pytest.approx(-1.2606, abs=5e-5)
     assert cmc_rate("Code+Carrier L1+L5", "IF") == pytest.approx(2.0)
-
-
-def test_full_sweep_takes_less_than_a_second():
-    grid = Grid(d_step_mps=0.001, onset_step_s=0.5)
-    assert (len(grid.rates_mps()), len(grid.offsets(0.5))) == (100, 601)
-    begin = time.process_time()
-    for mode in FAULT_MODES:
-        study(mode, "gast-f-sound", Smoothing(), grid)
-    assert time.process_time() - begin < 1.0
 
 
 @pytest.mark.parametrize(

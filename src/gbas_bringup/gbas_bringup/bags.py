@@ -128,14 +128,6 @@ class BagReader:
         return {name: values for scan in self.scans for name, values in scan.metadata}
 
 
-def read_metadata(path: Path) -> dict[str, dict[str, str]]:
-    """Metadata records of a bag (they stand before its messages, but the closing ones are at the end)."""
-    reader = BagReader(path, strict=False)
-    for _ in reader.messages():
-        pass
-    return reader.metadata
-
-
 def configuration_of(path: Path, metadata: Mapping[str, Mapping[str, str]]) -> dict[str, str]:
     """The configuration files stored in a bag, by name.
 

@@ -14,6 +14,7 @@ latency     live nodes at 2 Hz: from observations to bursts and to protection le
 replay      live nodes with a recorder, data as fast as they are taken, against 100 times real time at 2 Hz
 files       the same with recorded receiver files
 monitors    all monitors of the station at one epoch with forty satellites, against 2 ms
+pieces      what every epoch or ephemeris costs in small things, each against its bound
 ccd         the full sweep of the divergence study against 1 s, and its monitors against 2 ms an epoch
 ==========  ===========================================================================================================
 
@@ -36,13 +37,16 @@ from gbas_bringup.bench_figures import Part, document, environment
 from gbas_bringup.cli_base import data_folder
 from gbas_bringup.errors import GbasError
 
-PARTS: Final = ("steps", "monitors", "simulator", "ccd", "siting", "offline", "process", "latency", "replay", "files")
+PARTS: Final = (
+    "steps", "monitors", "pieces", "simulator", "ccd", "siting", "offline", "process", "latency", "replay", "files",
+)  # fmt: skip
 LATENCY_S: Final = 40.0
 QUICK_LATENCY_S: Final = 8.0
 _STEP_EPOCHS: Final = (300, 60)
 _WORLD_EPOCHS: Final = (1000, 100)
 _SITING_CANDIDATES: Final = (4_000_000, 1_000_000)
 _MONITOR_EPOCHS: Final = (1000, 100)
+_PIECE_REPEATS: Final = (200, 20)
 _REPLAY_EPOCHS: Final = (1200, 300)
 _BUSY_LOAD: Final = 0.5
 
@@ -100,7 +104,16 @@ def run_bench(
 
 def _measures(out: Path, quick: bool, seconds: float | None, data: Path | None) -> Mapping[str, Callable[[], Part]]:
     """What measures each part; the libraries are loaded when they are needed."""
-    from gbas_bringup import bench_ccd, bench_live, bench_monitors, bench_offline, bench_peer, bench_sim, bench_siting
+    from gbas_bringup import (
+        bench_ccd,
+        bench_live,
+        bench_monitors,
+        bench_offline,
+        bench_peer,
+        bench_pieces,
+        bench_sim,
+        bench_siting,
+    )
 
     make_flight = cache(bench_offline.make_flight)
     step_epochs = bench_offline.SETTLE_EPOCHS + _STEP_EPOCHS[quick]
@@ -115,6 +128,7 @@ def _measures(out: Path, quick: bool, seconds: float | None, data: Path | None) 
         "replay": lambda: bench_live.measure_replay(out / "replay", n_epochs=_REPLAY_EPOCHS[quick]),
         "files": lambda: bench_live.measure_files(out / "files", data),
         "monitors": lambda: bench_monitors.measure_monitors(_STEP_EPOCHS[quick]),
+        "pieces": lambda: bench_pieces.measure_pieces(_PIECE_REPEATS[quick]),
         "ccd": lambda: bench_ccd.measure_ccd(_MONITOR_EPOCHS[quick]),
     }
 

@@ -19,8 +19,9 @@ from gbas_bringup.errors import GbasError
 from gbas_core.ephemeris import Ephemeris
 from gbas_core.gpstime import from_epoch_key
 from gbas_core.recording import RecordedEpoch
+from gbas_ground.broadcast import BroadcastState
 from gbas_ground.params import GroundParams
-from gbas_ground.station import GroundEpoch, GroundStation, Monitored, initial_broadcast_state, initial_monitor_state
+from gbas_ground.station import GroundEpoch, GroundStation, Monitored, initial_monitor_state
 from gbas_msgs_py import tables
 from gbas_msgs_py.records import ProtectionEpoch, SolutionEpoch
 from gbas_msgs_py.vdb.receive import decode_burst
@@ -145,7 +146,7 @@ def measure_steps(flight: Flight) -> Part:
 
 def _step_through(flight: Flight, clock: _Clock) -> None:
     """The steps one by one, as the nodes take them."""
-    monitor, broadcast = initial_monitor_state(flight.ground), initial_broadcast_state(flight.ground)
+    monitor, broadcast = initial_monitor_state(flight.ground), BroadcastState()
     position, service = PositionState(), ServiceState()
     ephemerides: tuple[Ephemeris, ...] = (flight.ephemeris,)
     for epoch in flight.epochs:

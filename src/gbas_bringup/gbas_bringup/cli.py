@@ -304,7 +304,8 @@ def bench(
     part: Annotated[
         list[str] | None,
         typer.Option(
-            help="One of steps, monitors, simulator, ccd, siting, offline, process, latency, replay, files; repeatable."
+            help="One of steps, monitors, pieces, simulator, ccd, siting, offline, process, latency, replay, files; "
+            "repeatable."
         ),
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Short runs: less exact.")] = False,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any
 
@@ -49,8 +48,3 @@ def qos_record(*, depth: int, reliable: bool = True, transient_local: bool = Fal
         "liveliness_lease_duration": dict(_INFINITE),
         "avoid_ros_namespace_conventions": False,
     }
-
-
-def is_transient_local(qos: Mapping[str, Any]) -> bool:
-    """Whether late joiners of a topic with this recorded QoS get what was sent before."""
-    return qos.get("durability") in ("transient_local", 1)

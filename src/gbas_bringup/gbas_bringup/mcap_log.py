@@ -18,7 +18,7 @@ from typing import Any, Final
 import yaml
 from mcap.writer import CompressionType, Writer
 
-from gbas_bringup.definitions import MESSAGE_ENCODING, SCHEMA_ENCODING, definition, typestore
+from gbas_bringup.definitions import MESSAGE_ENCODING, SCHEMA_ENCODING, definition
 from gbas_bringup.errors import BagError
 
 CHUNK_BYTES: Final = 256 * 1024
@@ -331,8 +331,3 @@ class BagWriter:
         information = rosbag2_metadata(self._path.name, self.log.topics, span, self._custom | dict(custom or {}))
         _write_atomically(self.folder / METADATA_FILE, _yaml({"rosbag2_bagfile_information": information}))
         return dict(span.by_topic)
-
-
-def known_types() -> frozenset[str]:
-    """Message types a recorder can describe without asking anybody."""
-    return frozenset(typestore().fielddefs)

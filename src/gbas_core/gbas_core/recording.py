@@ -89,7 +89,8 @@ class Recording:
         RecordingError
             When the files do not go together: no epoch in common, or navigation of another time or of two formats.
         """
-        files = tuple(_read_observations(path, gps_week) for path in ground)
+        # Another site or antenna of a reference receiver: nothing smoothed before it is of use after it.
+        files = tuple(_read_observations(path, gps_week).restarted_at_site_changes() for path in ground)
         user_file = None if user is None else _read_observations(user, gps_week)
         own = _read_navigation(navigation, galileo, gps_week)
         theirs = _read_navigation(user_navigation, galileo, gps_week) if user_navigation else own

@@ -47,9 +47,6 @@ CLOCK_STEP_M: Final = 150.0
 
 _LAMBDA_M: Final = WAVELENGTH_M[:, np.newaxis]
 _MILLISECOND_M: Final = SPEED_OF_LIGHT_MPS * 1e-3
-_FIT_UNKNOWNS: Final = 4
-_FIT_MAX_CONDITION: Final = 100.0
-_FIT_MIN_REDUNDANCY: Final = 0.05
 # Codes smoothed by the receiver repeat by chance while the range stands still, but not beyond their noise.
 _FROZEN_CODE_M: Final = 1.0
 _WHOLE_MILLISECONDS_M: Final = 15.0  # a code step this close to whole milliseconds is one
@@ -210,7 +207,6 @@ def slip_step(
     params: SlipParams,
     *,
     range_m: FloatArray | None = None,
-    los: FloatArray | None = None,
 ) -> tuple[SlipState, SlipResult]:
     """Test one epoch of several receivers.
 
@@ -226,10 +222,6 @@ def slip_step(
     range_m : (R, N_SATS) array, optional
         Geometric range minus satellite clock, where the receiver's position is known [m]; the rate test then needs no
         history and stays sharp at long intervals. NaN for satellites without an ephemeris.
-    los : (R, 3, N_SATS) array, optional
-        Unit vectors to the satellites in any frame, good to a milliradian; NaN where unknown. With them the Doppler
-        and rate tests fit and remove the receiver's motion instead of allowing for ``receiver_jerk_mps3``, as long as
-        there are two satellites more than the fit needs.
 
     Returns
     -------
@@ -246,7 +238,7 @@ def slip_step(
             step_m = _steps_to_follow(epoch, clock_step_m, params)
             followed_m, carrier_m = followed_m + step_m, carrier_m + step_m[:, np.newaxis, np.newaxis]
             epoch = epoch._replace(carrier_m=carrier_m - state.carrier_m)
-        found, rate_mps = _tests(epoch, state, los, dt_s, params)
+        found, rate_mps = _tests(epoch, state, dt_s, params)
         cause |= found | _frozen(state, code_m, carrier_m)
         rate_mps = np.where(cause == 0, rate_mps, np.nan)
     else:
@@ -322,9 +314,7 @@ def _steps_to_follow(epoch: _Epoch, clock_step_m: FloatArray, params: SlipParams
     return result
 
 
-def _tests(
-    epoch: _Epoch, state: SlipState, los: FloatArray | None, dt_s: float, params: SlipParams
-) -> tuple[CauseArray, FloatArray]:
+def _tests(epoch: _Epoch, state: SlipState, dt_s: float, params: SlipParams) -> tuple[CauseArray, FloatArray]:
     """Causes found by comparison with the past, and carrier rates [m/s] for the epochs to come."""
     code = np.abs(epoch.carrier_m - epoch.code_m) > params.code_base_m + params.code_rate_mps * dt_s
 
@@ -336,9 +326,9 @@ def _tests(
     _, enough_ahead, enough_off = np.split(enough, 3)
 
     still_m = params.doppler_base_m + params.doppler_noise_mps * dt_s
-    doppler = _apart(beside_m - beside_common_m, los, still_m, dt_s**3 / 12.0, params)
+    doppler = _apart(beside_m - beside_common_m, still_m, dt_s**3 / 12.0, params)
 
-    rate = enough_ahead & _apart(ahead_m - ahead_common_m, los, params.rate_base_m, dt_s**3, params)
+    rate = enough_ahead & _apart(ahead_m - ahead_common_m, params.rate_base_m, dt_s**3, params)
 
     rate |= enough_off & (np.abs(off_m - off_common_m) > params.rate_base_m + params.range_rate_mps * dt_s)
 
@@ -351,53 +341,13 @@ def _tests(
     return cause, (epoch.carrier_m - step_m) / epoch.dt_s
 
 
-def _apart(
-    surprise_m: FloatArray, los: FloatArray | None, base_m: float, per_jerk_s3: float, params: SlipParams
-) -> BoolArray:
+def _apart(surprise_m: FloatArray, base_m: float, per_jerk_s3: float, params: SlipParams) -> BoolArray:
     """Where a carrier left its prediction by more than noise and motion explain, (R, N_BANDS, N_SATS).
 
     `per_jerk_s3` is how a jerk shows in the surprise.
     """
     still_m = base_m + params.satellite_jerk_mps3 * per_jerk_s3
-    found: BoolArray = np.abs(surprise_m) > still_m + 2.0 * params.receiver_jerk_mps3 * per_jerk_s3
-    for receiver, directions in enumerate(() if los is None else los):
-        motionless_m = _without_motion(surprise_m[receiver], directions, still_m)
-        if motionless_m is not None:
-            fitted = ~np.isnan(motionless_m)
-            found[receiver][fitted] = np.abs(motionless_m[fitted]) > still_m
-    return found
-
-
-def _without_motion(surprise_m: FloatArray, los: FloatArray, limit_m: float) -> FloatArray | None:
-    """Surprises (N_BANDS, N_SATS) of one receiver less the motion and clock that explain most of them.
-
-    Satellites that disagree are left out of the fit one after the other, the worst first; a surprise that takes part is
-    scaled up for its pull on the fit. None if there are too few satellites to tell motion from slips; infinite
-    surprises if there are too few left that agree.
-    """
-    rows = np.isfinite(surprise_m) & np.isfinite(los).all(axis=0)
-    satellite = np.nonzero(rows)[1]
-    design = np.concatenate([-los, np.ones((1, los.shape[-1]))])[:, satellite].T
-    value_m, kept = surprise_m[rows], np.ones(len(satellite), dtype=bool)
-    needed = max(_FIT_UNKNOWNS + 2, 2 * np.unique(satellite).size / 3)
-    while np.unique(satellite[kept]).size >= needed:
-        left, singular, right = np.linalg.svd(design[kept], full_matrices=False)
-        if not singular[0] <= _FIT_MAX_CONDITION * singular[-1]:
-            break
-        projected_m = left.T @ value_m[kept]
-        redundancy = np.maximum(1.0 - np.einsum("ij,ij->i", left, left), _FIT_MIN_REDUNDANCY)
-        rest_m = np.abs(value_m[kept] - left @ projected_m) / np.sqrt(redundancy)
-        worst = int(np.argmax(rest_m))
-        if rest_m[worst] <= limit_m:
-            return _on_rows(value_m - design @ (right.T @ (projected_m / singular)), rows)
-        kept &= satellite != satellite[kept][worst]
-    return None if kept.all() else _on_rows(np.full(len(satellite), np.inf), rows)
-
-
-def _on_rows(value: FloatArray, rows: BoolArray) -> FloatArray:
-    result = np.full(rows.shape, np.nan)
-    result[rows] = value
-    return result
+    return np.asarray(np.abs(surprise_m) > still_m + 2.0 * params.receiver_jerk_mps3 * per_jerk_s3)
 
 
 def _common(residual_m: FloatArray, min_satellites: int) -> tuple[FloatArray, BoolArray]:

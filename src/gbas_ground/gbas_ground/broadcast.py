@@ -14,13 +14,13 @@ import numpy as np
 
 from gbas_core.gpstime import epoch_key
 from gbas_core.record import FloatArray
-from gbas_core.satellites import RANGING_SOURCE_ID
+from gbas_core.satellites import IS_GALILEO, RANGING_SOURCE_ID
 from gbas_ground.corrections import BoolArray
 from gbas_ground.monitors.multiple_reference import MAX_B_VALUE_M
 from gbas_ground.orbit_claim import MAX_DECORRELATION
 from gbas_ground.params import GCID_UNHEALTHY, MAX_SIGMA_VIG, MIN_SERVICE_SATELLITES, GroundParams
 from gbas_ground.sigma import MAX_SIGMA_M
-from gbas_msgs_py.records import ChannelState, IntegrityEpoch
+from gbas_msgs_py.records import MAX_REFERENCE_RECEIVERS, ChannelState, IntegrityEpoch
 from gbas_msgs_py.vdb.burst import FRAME_DURATION_S, Burst
 from gbas_msgs_py.vdb.messages import Correction30, Correction100, FasDataSet, Type2
 from gbas_msgs_py.vdb.schedule import (
@@ -35,6 +35,7 @@ from gbas_msgs_py.vdb.schedule import (
 _FRAME_MS: Final = round(1000 * FRAME_DURATION_S)
 _IOD_MODULUS: Final = 256
 _MAX_CRC: Final = 0xFFFF
+_MAX_IOD: Final = np.where(IS_GALILEO, 1023, 255)  # Known: IODnav has 10 bits, IODE 8
 RESTART_AFTER_REFUSED: Final = 10
 """Epochs refused, each later than the one before, after which the station believes them and starts anew. Ours."""
 
@@ -72,7 +73,7 @@ def broadcastable(integrity: IntegrityEpoch, params: GroundParams) -> BoolArray:
     """Satellites whose corrections are usable, complete and within what the messages can carry, ``(N,)``."""
     b = np.where(np.isnan(integrity.b_m), 0.0, np.abs(integrity.b_m)).max(axis=0)
     ok = (integrity.state == ChannelState.USABLE) & _counts(integrity.iod) & _counts(integrity.ephemeris_crc)
-    ok = ok & (integrity.ephemeris_crc <= _MAX_CRC)
+    ok = ok & (integrity.ephemeris_crc <= _MAX_CRC) & (integrity.iod <= _MAX_IOD)
     for decorrelation in (integrity.p_ephemeris, integrity.p_ephemeris_d):
         ok = ok & (decorrelation >= 0.0) & (decorrelation <= MAX_DECORRELATION)
     for prc, rrc in (
@@ -116,7 +117,8 @@ def broadcast_frame(
     station, approaches, schedule, room = _constants(params)
     usable = broadcastable(integrity, params)
     sigma_vig = integrity.sigma_vert_iono_gradient
-    serves = bool(integrity.n_receivers >= params.min_receivers and 0.0 <= sigma_vig <= MAX_SIGMA_VIG)
+    enough = params.min_receivers <= integrity.n_receivers <= MAX_REFERENCE_RECEIVERS
+    serves = bool(enough and 0.0 <= sigma_vig <= MAX_SIGMA_VIG)
     satellites = _highest(usable, integrity.elevation_rad, room) if serves else ()
     serves = len(satellites) >= MIN_SERVICE_SATELLITES
     # a station that does not serve says so, and claims the least it can of the ionosphere

@@ -178,7 +178,13 @@ class AccelerationSection(Declared):
     points: int = parameter("acceleration", "points", 10, "-", "most epochs in the fit", low=4, high=120)
     least_points: int = parameter("acceleration", "least_points", 5, "-", "fewest epochs in it", low=4, high=120)
     min_satellites: int = parameter(
-        "acceleration", "min_satellites", 3, "-", "others a receiver's clock is taken from", low=2, high=35
+        "acceleration",
+        "min_satellites",
+        CarrierAccelerationParams.min_satellites,
+        "-",
+        "others a receiver's clock is taken from",
+        low=2,
+        high=35,
     )
     common: tuple[float, float, float] = parameter(
         "acceleration", "common", CarrierAccelerationParams.common, "m, m/s, m/s2",
@@ -219,29 +225,60 @@ class AccelerationSection(Declared):
 
 @dataclass(frozen=True, kw_only=True)
 class PowerSection(Declared):
+    """C/N0 against one limit for all elevations, ``monitors.min_cn0_dbhz``."""
+
+    exclude: bool = parameter("power", "exclude", True, "-", "channels that fail are excluded")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExpectedPowerSection(Declared):
     """C/N0 against what is expected at the elevation."""
 
-    exclude: bool = parameter("power", "exclude", True, "-", "satellites and channels that fail are excluded")
+    exclude: bool = parameter("expected_power", "exclude", True, "-", "satellites and channels that fail are excluded")
     elevation_rad: tuple[float, ...] = parameter(
-        "power", "elevation_deg", PowerExpectationParams.elevation_rad, "deg", "nodes of the table, rising",
+        "expected_power", "elevation_deg", PowerExpectationParams.elevation_rad, "deg", "nodes of the table, rising",
         low=0.0, high=90.0, per_unit=_DEGREE,
     )  # fmt: skip
     minimum_l1_dbhz: tuple[float, ...] = parameter(
-        "power", "minimum_l1_dbhz", PowerExpectationParams.minimum_dbhz[0], "dB-Hz", "at the nodes", low=0.0, high=70.0
+        "expected_power",
+        "minimum_l1_dbhz",
+        PowerExpectationParams.minimum_dbhz[0],
+        "dB-Hz",
+        "at the nodes",
+        low=0.0,
+        high=70.0,
     )
     minimum_l2_dbhz: tuple[float, ...] = parameter(
-        "power", "minimum_l2_dbhz", PowerExpectationParams.minimum_dbhz[1], "dB-Hz", "at the nodes", low=0.0, high=70.0
+        "expected_power",
+        "minimum_l2_dbhz",
+        PowerExpectationParams.minimum_dbhz[1],
+        "dB-Hz",
+        "at the nodes",
+        low=0.0,
+        high=70.0,
     )
     minimum_l5_dbhz: tuple[float, ...] = parameter(
-        "power", "minimum_l5_dbhz", PowerExpectationParams.minimum_dbhz[2], "dB-Hz", "at the nodes", low=0.0, high=70.0
+        "expected_power",
+        "minimum_l5_dbhz",
+        PowerExpectationParams.minimum_dbhz[2],
+        "dB-Hz",
+        "at the nodes",
+        low=0.0,
+        high=70.0,
     )
     channel_margin_db: float = parameter(
-        "power", "channel_margin_db", 4.0, "dB", "a single channel may be this much lower", low=0.0, high=40.0
+        "expected_power", "channel_margin_db", 4.0, "dB", "a single channel may be this much lower", low=0.0, high=40.0
     )
     average_s: float = parameter(
-        "power", "average_s", PowerExpectationParams.average_s, "s", "time constant of the average", low=0.1, high=600.0
+        "expected_power",
+        "average_s",
+        PowerExpectationParams.average_s,
+        "s",
+        "time constant of the average",
+        low=0.1,
+        high=600.0,
     )
-    learn: bool = parameter("power", "learn", False, "-", "let what the receivers saw raise the minimum")
+    learn: bool = parameter("expected_power", "learn", False, "-", "let what the receivers saw raise the minimum")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -440,6 +477,7 @@ class MonitorParams(Declared):
     gradient: GradientSection = nested(GradientSection())
     ephemeris: EphemerisSection = nested(EphemerisSection())
     power: PowerSection = nested(PowerSection())
+    expected_power: ExpectedPowerSection = nested(ExpectedPowerSection())
     sigma: SigmaSection = nested(SigmaSection())
 
     def __post_init__(self) -> None:
@@ -475,5 +513,6 @@ class MonitorParams(Declared):
             gradient=replace(self.gradient, exclude=False),
             ephemeris=replace(self.ephemeris, exclude=False),
             power=replace(self.power, exclude=False),
+            expected_power=replace(self.expected_power, exclude=False),
             sigma=replace(self.sigma, exclude=False),
         )

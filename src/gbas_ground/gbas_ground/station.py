@@ -205,11 +205,6 @@ def initial_monitor_state(params: GroundParams) -> MonitorState:
     )
 
 
-def initial_broadcast_state(params: GroundParams) -> BroadcastState:
-    """A broadcast that has sent nothing."""
-    return BroadcastState()
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StationState:
     """State of the whole station."""
@@ -220,7 +215,7 @@ class StationState:
 
 def initial_state(params: GroundParams) -> StationState:
     """A station that has just been switched on."""
-    return StationState(monitor=initial_monitor_state(params), broadcast=initial_broadcast_state(params))
+    return StationState(monitor=initial_monitor_state(params), broadcast=BroadcastState())
 
 
 @lru_cache(maxsize=8)
@@ -418,7 +413,8 @@ def _follow(
     should = expected(known.current, epoch.gps_week, epoch.tow_s, raw.code_m[:, L1], site)
     tracked = np.isfinite(raw.code_m[:, L1] + raw.carrier_m[:, L1])
     checks = _channel_checks(raw, should, tracked, params)
-    exclusions = _exclude_channels(exclusions, checks, events)
+    excluding = checks if params.monitors.power.exclude else checks[:1]
+    exclusions = _exclude_channels(exclusions, excluding, events)
     exclusions = _exclude_receivers(
         exclusions, _far_receivers(checks[0][1], params), ExclusionCause.RECEIVER_FAULT, events
     )
@@ -430,7 +426,7 @@ def _follow(
         raw=clean,
         should=should,
         tracked=tracked,
-        channel_ok=tracked & ~np.logical_or.reduce([check.failed for _, check in checks]),
+        channel_ok=tracked & ~np.logical_or.reduce([check.failed for _, check in excluding]),
         settled=_settled(tracks, correction_m, should, params),
         checks=checks,
         tracking=tracking,

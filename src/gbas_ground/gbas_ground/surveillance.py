@@ -247,7 +247,7 @@ def _settings(params: GroundParams) -> _Settings:
         gradient_required=sections.gradient.required or params.gast_d,
         ephemeris=params.ephemeris_monitor(),
         orbit_required=not params.external_monitor and (sections.ephemeris.required or params.gast_d),
-        power=sections.power.params(params.max_gap_s),
+        power=sections.expected_power.params(params.max_gap_s),
         site=site,
         orbit_site=params.orbit_site(),
         planes=planes_of(site.baselines, gradient.bands),
@@ -286,7 +286,7 @@ def watch(state: WatchState, seen: Seen, params: GroundParams) -> tuple[WatchSta
         state.ephemeris, differences, seen, settings, exclude=sections.ephemeris.exclude
     )
     power, expectation = _power(
-        state.power, seen, settings, exclude=sections.power.exclude, required=params.require_cn0
+        state.power, seen, settings, exclude=sections.expected_power.exclude, required=params.require_cn0
     )
     parts = (_common_slip(seen), divergence, two_frequency, carrier, gradient, orbit, expectation)
     ready = np.ones_like(seen.due)

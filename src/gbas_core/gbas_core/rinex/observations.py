@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -15,6 +15,8 @@ from gbas_core.files import PathLike
 from gbas_core.gpstime import MILLISECONDS_PER_WEEK, calendar_text, epoch_key, from_epoch_key, gps_from_calendar
 from gbas_core.observations import ObservationEpoch
 from gbas_core.record import FloatArray
+from gbas_core.rinex.lines import EPOCH_LINE_2, stray_lines
+from gbas_core.rinex.site_changes import site_changes
 from gbas_core.rinex.text import SIMULATED_LABEL, RinexError, checked_version, parser_problem, read_text
 from gbas_core.satellites import SAT_INDEX
 from gbas_core.signals import BAND_INDEX, WAVELENGTH_M
@@ -41,8 +43,6 @@ _INTERVAL_TOLERANCE_S: Final = 0.001
 _OBSERVED_FLAGS: Final = (0, 1)
 _POWER_FAILURE_FLAG: Final = 1
 _CYCLE_SLIP_FLAG: Final = 6
-# Epoch lines: RINEX 2.11 table A2 (1X,I2.2,4(1X,I2),F11.7,2X,I1,I3); RINEX 3 and 4 begin theirs with ">".
-_EPOCH_LINE_2: Final = re.compile(r"^ [ \d]\d [ \d]\d [ \d]\d [ \d]\d [ \d]\d [ \d]\d\.\d{7}  \d[ \d]{3}", re.MULTILINE)
 _EPOCH_LINE_3: Final = re.compile(r"^>", re.MULTILINE)
 _CRINEX_LABEL: Final = "CRINEX VERS   / TYPE"
 _MAX_CRINEX_LINES_PER_EPOCH: Final = 200
@@ -73,6 +73,8 @@ class ObservationFile:
     simulated : bool
     notes : tuple of str
         What was left out or repaired.
+    site_changes : tuple of int
+        Epochs before which the file tells of another site or antenna.
     """
 
     path: Path
@@ -90,6 +92,7 @@ class ObservationFile:
     signals: Mapping[tuple[str, str], SignalChoice]
     simulated: bool
     notes: tuple[str, ...]
+    site_changes: tuple[int, ...] = ()
 
     def __len__(self) -> int:
         return len(self.tow_s)
@@ -112,6 +115,18 @@ class ObservationFile:
     def describe(self) -> str:
         """One line: the file, the receiver and the time it covers."""
         return f"observations {self.path} ({self.marker}) cover {_text(self.first)} to {_text(self.last)}"
+
+    def restarted_at_site_changes(self) -> ObservationFile:
+        """The same with lock lost on every channel's first carrier after a change of site or antenna."""
+        if not self.site_changes:
+            return self
+        lli, there = self.lli.copy(), np.isfinite(self.carrier_m)
+        for row in self.site_changes:
+            first = row + there[row:].argmax(axis=0)
+            places = (first, *np.indices(first.shape))
+            lli[places] = _with_bit_0(lli[places], self.carrier_m[places])
+        lli.flags.writeable = False
+        return replace(self, lli=lli)
 
     def epoch(self, index: int) -> ObservationEpoch:
         """The observations of one epoch."""
@@ -156,7 +171,8 @@ def read_observations(
 
     Notes
     -----
-    Event records (flags 2 to 5) are skipped. A power failure (flag 1) and cycle slip records (flag 6) set bit 0 of
+    Events that change the site or the antenna (flags 2 to 4) are noted, see `site_changes`; lines between the epochs
+    that are no records are counted in a note. A power failure (flag 1) and cycle slip records (flag 6) set bit 0 of
     `lli` on all channels concerned. Zero means missing, as RINEX says. C/N0 is NaN where the file does not say that
     its signal strengths are in dB-Hz (RINEX 2 without SIGNAL STRENGTH UNIT: the unit is the receiver's own).
     An incomplete last epoch is left out.
@@ -172,6 +188,7 @@ def read_observations(
     if header.signal_strength_unit != "DBHZ" and version < 3.0 and np.isfinite(arrays[CN0]).any():
         notes.append("signal strengths are in the receiver's own unit (no SIGNAL STRENGTH UNIT DBHZ) and left out")
         arrays[CN0][:] = np.nan
+    changes = _site_changes(header, parsed.epochs, epochs, notes)
     _note_early_end(path, header, epochs.keys, notes)
     week, milliseconds = np.divmod(epochs.keys, MILLISECONDS_PER_WEEK)
     tow_s = milliseconds / 1000.0
@@ -194,6 +211,7 @@ def read_observations(
         signals=chosen,
         simulated=simulated or any(comment.startswith(SIMULATED_LABEL) for comment in header.comments),
         notes=tuple(notes),
+        site_changes=changes,
     )
 
 
@@ -206,12 +224,14 @@ def _parsed(path: Path, notes: list[str]) -> tuple[float, Any]:
     try:
         parsed = sidereon.parse_rinex_obs(text)
     except sidereon.ParseError as error:
-        starts = [match.start() for match in (_EPOCH_LINE_2 if version < 3.0 else _EPOCH_LINE_3).finditer(text)]
+        starts = [match.start() for match in (EPOCH_LINE_2 if version < 3.0 else _EPOCH_LINE_3).finditer(text)]
         try:
             parsed = sidereon.parse_rinex_obs(text[: starts[-1] if starts else 0])
         except sidereon.ParseError:
             raise RinexError(path, parser_problem(text, error)) from error
         notes.append(f"the last epoch is incomplete and was left out ({parser_problem(text, error)})")
+    if stray := stray_lines(text, version):
+        notes.append(f"{stray} lines between the epochs are no records and were left out")
     if parsed.skipped_records:
         notes.append(f"{parsed.skipped_records} records were not understood and left out")
     return version, parsed
@@ -326,6 +346,17 @@ def _flat_values(parsed: Any, epochs: _Epochs, signals: SignalTable) -> FlatValu
     return FlatValues(
         codes=codes, epoch=epoch[keep], satellite=satellites[keep], code=code, value=value * unit[code], lli=lli[keep]
     )
+
+
+def _site_changes(header: Any, parsed_epochs: Sequence[Any], epochs: _Epochs, notes: list[str]) -> tuple[int, ...]:
+    """Rows before which the site or antenna changes; each change is noted."""
+    rows = []
+    for change in site_changes(header, parsed_epochs):
+        row = int(np.searchsorted(epochs.indices, change.after))
+        if row < len(epochs.indices):
+            notes.append(f"before {_text(from_epoch_key(int(epochs.keys[row])))} the file tells of: {change.what}")
+            rows.append(row)
+    return tuple(rows)
 
 
 def _set_loss_of_lock(lli: FloatArray, carrier_m: FloatArray, epochs: _Epochs) -> None:

@@ -7,9 +7,11 @@ from pathlib import Path
 from typing import Final
 
 from gbas_core.files import GnssFileError, read_bytes
+from gbas_core.rinex.lines import is_whole
 
 _QUOTED_LINE: Final = re.compile(r' in "(.*)', re.DOTALL)
 
+_BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"
 SIMULATED_LABEL: Final = "SIMULATED DATA"
 
 
@@ -20,7 +22,8 @@ class RinexError(GnssFileError):
 def read_text(path: Path, notes: list[str]) -> str:
     """Text of a file, one character a byte (RINEX is ASCII), whole lines only.
 
-    A last line without an end is left out: a number in it may be cut, and would still look like a number.
+    A last line without an end is left out unless its last number is there to the last digit: it may be cut, and would
+    still look like a number.
 
     Raises
     ------
@@ -28,9 +31,12 @@ def read_text(path: Path, notes: list[str]) -> str:
         If the file cannot be read, is empty, or is compressed in a way that is not understood.
     """
     data = read_bytes(path, notes, RinexError)
+    data = data.removeprefix(_BYTE_ORDER_MARK)
     if not data.strip():
         raise RinexError(path, "is empty; expected a RINEX file")
     text = re.sub(rb"[^\x00-\x7f]", b"?", data).decode("ascii").replace("\r\n", "\n")
+    if not text.endswith("\n") and is_whole(text):
+        text += "\n"
     if not text.endswith("\n"):
         notes.append("the last line has no end: it was taken for cut off and left out")
         text = text[: text.rfind("\n") + 1] or text

@@ -25,6 +25,7 @@ from dataclasses import dataclass, replace
 from typing import Final, Literal, NamedTuple
 
 import numpy as np
+from scipy.stats import binom
 
 from gbas_core.record import FloatArray
 from gbas_core.satellites import N_SATS
@@ -32,12 +33,36 @@ from gbas_core.signals import L1, L5
 from gbas_ground.corrections import BoolArray
 from gbas_ground.monitors.carrier_noise import CarrierNoise
 from gbas_ground.monitors.expected_range import row_median
-from gbas_ground.monitors.false_alarm import EPOCH_S, FALSE_EXCLUSION, false_alarm_multiplier
+from gbas_ground.monitors.false_alarm import EPOCH_S, EXPOSURE_S, FALSE_EXCLUSION, false_alarm_multiplier
 from gbas_ground.monitors.result import MonitorResult, upper_limit
 
 STATISTICS: Final = ("step_m", "rate_mps", "acceleration_mps2")
 Fault = Literal["step", "ramp", "acceleration"]
 _LEAST_POINTS: Final = 4  # a parabola and one to spare
+_MOST_OTHERS: Final = 35
+FAULT_RATE_PER_H: Final = 1e-5
+"""Faults of one satellite. Known: GPS SPS Performance Standard 2020, major service failures."""
+
+
+def fewest_others(p_false_alarm: float) -> int:
+    """Fewest other satellites a receiver's clock may be taken from.
+
+    A fault of another satellite is in that clock, and with one other a fault of either looks the same: of two, the one
+    at fault is further from the clock of the rest. So two have to be left when all that fault at once are out of the
+    set, and more than so many may fault only with less than the budget.
+
+    Parameters
+    ----------
+    p_false_alarm : float
+        For one source in 15 s.
+    """
+    faults = 0
+    while binom.sf(faults, _MOST_OTHERS, FAULT_RATE_PER_H * EXPOSURE_S / 3600.0) > p_false_alarm:
+        faults += 1
+    return faults + 2
+
+
+FEWEST_OTHERS: Final = fewest_others(FALSE_EXCLUSION)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,7 +80,7 @@ class CarrierAccelerationParams:
     least_points : int
         Fewest epochs a channel is judged by.
     min_satellites : int
-        Fewest satellites a receiver's clock is taken from.
+        Fewest others a receiver's clock is taken from (:func:`fewest_others`).
     max_gap_s : float
         Longest gap a channel's fit goes across [s].
     noise : CarrierNoise
@@ -76,7 +101,7 @@ class CarrierAccelerationParams:
     points: int = 10
     window_s: float = 5.0
     least_points: int = 5
-    min_satellites: int = 4
+    min_satellites: int = FEWEST_OTHERS
     max_gap_s: float = 3.5
     noise: CarrierNoise = CarrierNoise(floor_m=(0.0015, 0.0015, 0.003), low_m=(0.006, 0.006, 0.010))
     common: tuple[float, float, float] = (0.0015, 0.001, 0.0005)

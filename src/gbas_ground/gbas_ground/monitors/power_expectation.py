@@ -85,18 +85,18 @@ class PowerExpectationParams:
     def __post_init__(self) -> None:
         nodes = np.array(self.elevation_rad)
         if nodes.size == 0 or not np.isfinite(nodes).all() or (np.diff(nodes) <= 0.0).any():
-            raise ValueError(f"power: elevation_rad is {self.elevation_rad}: at least one node, rising")
+            raise ValueError(f"expected_power: elevation_rad is {self.elevation_rad}: at least one node, rising")
         if len(self.minimum_dbhz) != N_BANDS or any(len(row) != nodes.size for row in self.minimum_dbhz):
-            raise ValueError(f"power: minimum_dbhz is not {N_BANDS} rows of {nodes.size} nodes")
+            raise ValueError(f"expected_power: minimum_dbhz is not {N_BANDS} rows of {nodes.size} nodes")
         if not np.isfinite(np.array(self.minimum_dbhz)).all():
-            raise ValueError(f"power: minimum_dbhz is {self.minimum_dbhz}: it must be finite")
+            raise ValueError(f"expected_power: minimum_dbhz is {self.minimum_dbhz}: it must be finite")
         if not self.bands or len(set(self.bands)) != len(self.bands):
-            raise ValueError(f"power: bands is {self.bands}: at least one, each once")
+            raise ValueError(f"expected_power: bands is {self.bands}: at least one, each once")
         for name in ("average_s", "learn_s", "learnt_after_s", "max_gap_s", "drop_db"):
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
-                raise ValueError(f"power: {name} is {getattr(self, name)}: it must be above 0")
+                raise ValueError(f"expected_power: {name} is {getattr(self, name)}: it must be above 0")
         if not (np.isfinite(self.channel_margin_db) and self.channel_margin_db >= 0.0):
-            raise ValueError(f"power: channel_margin_db is {self.channel_margin_db}: it must not be negative")
+            raise ValueError(f"expected_power: channel_margin_db is {self.channel_margin_db}: it must not be negative")
 
 
 def minimum_from_expectation(

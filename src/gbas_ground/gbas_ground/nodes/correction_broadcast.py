@@ -5,8 +5,9 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
+from gbas_ground.broadcast import BroadcastState
 from gbas_ground.nodes.configuration import station_params
-from gbas_ground.station import GroundStation, initial_broadcast_state
+from gbas_ground.station import GroundStation
 from gbas_msgs_py import tables, topics
 from gbas_msgs_py.node import ConfiguredParams, GbasNode, run
 from gbas_msgs_py.records import IntegrityEpoch
@@ -19,7 +20,7 @@ class CorrectionBroadcast(GbasNode):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("correction_broadcast", ConfiguredParams, **kwargs)
         self.station = station_params(self, self.params.config)
-        self.state = initial_broadcast_state(self.station)
+        self.state = BroadcastState()
         self.bursts_sent = 0
         self.send = self.burst_publisher(topics.VDB, readers=1)
         self.table_subscription(topics.GROUND_INTEGRITY, tables.INTEGRITY, self.on_integrity)
