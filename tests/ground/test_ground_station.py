@@ -95,6 +95,11 @@ def test_nothing_is_usable_before_the_filters_have_settled():
     assert out.told("corrections_begin") == [(8.0, "station", "station")]
 
 
+def test_a_station_without_a_threat_model_of_the_ionosphere_says_so_once():
+    out = run(truth(2), params(2), half_seconds(4))
+    assert out.told("ionosphere_no_threat_model") == [(0.0, "station", "station")]
+
+
 def step_on(receivers, receiver, satellite, size, begin, end=np.inf):
     """Code error of one channel between two times."""
 

@@ -102,6 +102,11 @@ def test_what_the_protection_costs(stage):
     assert (germany.served & near).sum() == (stage.unprotected.served & near).sum() > 80
     assert np.nanmin(germany.level_m[near, 0]) > 2.0 * np.nanmax(stage.unprotected.level_m[near, 0])
     assert not (conus.served & near).any()
+    assert not conus.used.any()  # nothing is sent as usable
+    last = slice(-10, None)
+    assert (conus.sigma_vig[last] == 25.5e-6).all()
+    assert (germany.sigma_vig[last] == 25.5e-6).all()
+    assert (stage.unprotected.sigma_vig[last] == 4e-6).all()
 
 
 def test_a_front_through_the_whole_chain_is_the_same(stage):
