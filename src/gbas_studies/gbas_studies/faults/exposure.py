@@ -11,10 +11,12 @@ more than 1.6 m must not stay undetected (known). Of fronts: :mod:`~.front_expos
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
 
+from gbas_core.record import FloatArray
 from gbas_studies.ccd.smoothed_error import Smoothing, largest_error_s
 
 MALFUNCTION_LIMIT_M: Final = 1.6
@@ -39,9 +41,16 @@ def divergence_limit_s(
     watch_s : float
         How long to look [s].
     """
-    since_s = np.arange(0.0, watch_s, smoothing.interval_s)
-    beyond = np.abs(rate_mps) * largest_error_s(since_s, smoothing) > limit_m
+    since_s, error_s = _worst_error(smoothing, watch_s)
+    beyond = np.abs(rate_mps) * error_s > limit_m
     return float(since_s[beyond.argmax()]) if beyond.any() else math.inf
+
+
+@lru_cache(maxsize=8)
+def _worst_error(smoothing: Smoothing, watch_s: float) -> tuple[FloatArray, FloatArray]:
+    """Times since the onset [s], and the worst user's error over the rate: the same for every rate and mode."""
+    since_s = np.arange(0.0, watch_s, smoothing.interval_s)
+    return since_s, largest_error_s(since_s, smoothing)
 
 
 def extrapolation_limit_s(
