@@ -66,4 +66,3 @@ def test_campaign_is_the_product(base):
     satellites = base.highest()[:2]
     found = campaign(base, ("Carrier L5",), (0.1,), satellites)
     assert [each.satellite for each in found] == [inject(base, "Carrier L5", 0.1, s).satellite for s in satellites]
-

@@ -314,9 +314,7 @@ def _steps_to_follow(epoch: _Epoch, clock_step_m: FloatArray, params: SlipParams
     return result
 
 
-def _tests(
-    epoch: _Epoch, state: SlipState, dt_s: float, params: SlipParams
-) -> tuple[CauseArray, FloatArray]:
+def _tests(epoch: _Epoch, state: SlipState, dt_s: float, params: SlipParams) -> tuple[CauseArray, FloatArray]:
     """Causes found by comparison with the past, and carrier rates [m/s] for the epochs to come."""
     code = np.abs(epoch.carrier_m - epoch.code_m) > params.code_base_m + params.code_rate_mps * dt_s
 
