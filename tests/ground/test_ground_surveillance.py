@@ -133,9 +133,10 @@ def test_data_too_slow_for_a_required_monitor_are_never_used():
     out = run(truth(4), station, 4.0 * np.arange(20))
     assert (out.array("state")[:, G02] != ChannelState.USABLE).all()
     assert out.integrity[-1].cause[G02] == ExclusionCause.UNMONITORED
-    assert run(truth(4), replace(station, monitors=watching_monitors()), 4.0 * np.arange(20)).integrity[-1].state[
-        G02
-    ] == ChannelState.USABLE
+    assert (
+        run(truth(4), replace(station, monitors=watching_monitors()), 4.0 * np.arange(20)).integrity[-1].state[G02]
+        == ChannelState.USABLE
+    )
 
 
 def test_service_type_d_needs_the_gradient_monitor():

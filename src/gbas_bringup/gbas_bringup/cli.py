@@ -152,8 +152,21 @@ def run(
     document = bags.info(plan.bag_path).as_json()
     if as_json:
         print_json(document)
-    else:
-        print_places({"bag": plan.bag_path})
+        return
+    whole = run_config.written(plan.directory).path
+    _print_run(plan.bag_path, whole, simulated=document["origin"] == "simulated")
+    print_places({"bag": plan.bag_path})
+
+
+def _print_run(bag: Path, config: Path, *, simulated: bool) -> None:
+    """What a recorded run gave, and what happened in it; a run without an aircraft has no positions to tell of."""
+    from gbas_bringup.demo import read_flown
+    from gbas_bringup.event_summary import event_lines, read_events
+
+    flown = read_flown(bag, config)
+    if flown.rows:
+        _print_summary({**flown.summary(), "simulated": simulated})
+    print("\n".join(event_lines(read_events(bag))) or "no exclusion, alert or change of service")
 
 
 def _remap(text: str) -> str:

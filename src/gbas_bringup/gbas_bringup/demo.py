@@ -17,6 +17,7 @@ from gbas_bringup.resources import config_path
 from gbas_bringup.results import Row, error_statistics, position_errors, summarise, write_json, write_solution_csv
 from gbas_bringup.run_config import read_run_config
 from gbas_bringup.runs import execute
+from gbas_core.approach import FinalApproach
 from gbas_core.gpstime import epoch_key
 from gbas_core.record import Record
 from gbas_ground.broadcast_claims import statements
@@ -85,6 +86,54 @@ def demo(
 def report_bag(bag: Path, directory: Path, *, config: Path) -> DemoResult:
     """Write table, summary and picture of a recorded approach, flown with the (whole) configuration `config`."""
     directory.mkdir(parents=True, exist_ok=True)
+    flown = read_flown(bag, config)
+    if not flown.pairs:
+        raise GbasError(f"{bag}: holds no airborne solution")
+    result = DemoResult(
+        bag=bag,
+        csv=directory / "solution.csv",
+        picture=directory / "approach.png",
+        summary_file=directory / "summary.json",
+        summary={**flown.summary(), "simulated": True},
+    )
+    write_solution_csv(result.csv, flown.rows)
+    write_json(result.summary_file, result.summary)
+    errors = position_errors(flown.rows, flown.truth_m, course_rad=flown.course_rad)
+    runway = f" to runway {flown.approach.runway}" if flown.approach else ""
+    plot_approach(
+        [solution for solution, _ in flown.pairs],
+        [protection for _, protection in flown.pairs],
+        result.picture,
+        title=f"Simulated approach{runway}, station {flown.station_id}, service type C",
+        errors_m=(errors.vertical_m, errors.lateral_m),
+    )
+    return result
+
+
+@dataclass(frozen=True, kw_only=True)
+class Flown:
+    """What the aircraft of a bag made of it, and the truth where the bag has it."""
+
+    pairs: list[tuple[SolutionEpoch, ProtectionEpoch]]
+    rows: list[Row]
+    truth_m: np.ndarray
+    approach: FinalApproach | None
+    station_id: str
+    rests_on: list[str]
+
+    @property
+    def course_rad(self) -> float:
+        """Course about which the lateral protection level holds."""
+        return self.approach.course_rad if self.approach else 0.0
+
+    def summary(self) -> dict[str, Any]:
+        """Counts and ranges, and errors where the truth is known."""
+        errors = error_statistics(self.rows, self.truth_m, course_rad=self.course_rad) if self.rows else {"epochs": 0}
+        return {**summarise(self.rows), "errors": errors, "rests_on": self.rests_on}
+
+
+def read_flown(bag: Path, config: Path) -> Flown:
+    """The aircraft's records in a bag of a run with the (whole) configuration `config`."""
     records = read_records(bag, (_SOLUTION, _PROTECTION, _TRUTH))
     protections = {_key(item): item for item in records[_PROTECTION] if isinstance(item, ProtectionEpoch)}
     pairs = [
@@ -92,37 +141,16 @@ def report_bag(bag: Path, directory: Path, *, config: Path) -> DemoResult:
         for item in records[_SOLUTION]
         if isinstance(item, SolutionEpoch) and _key(item) in protections
     ]
-    if not pairs:
-        raise GbasError(f"{bag}: holds no airborne solution")
     rows = [Row.of(solution, protection) for solution, protection in pairs]
-    truth = _truth_m(records[_TRUTH], rows)
     station = GroundParams.from_yaml(config)
-    approach = station.approaches[0] if station.approaches else None
-    course_rad = approach.course_rad if approach else 0.0
-    result = DemoResult(
-        bag=bag,
-        csv=directory / "solution.csv",
-        picture=directory / "approach.png",
-        summary_file=directory / "summary.json",
-        summary={
-            **summarise(rows),
-            "errors": error_statistics(rows, truth, course_rad=course_rad),
-            "rests_on": list(statements(station)),
-            "simulated": True,
-        },
+    return Flown(
+        pairs=pairs,
+        rows=rows,
+        truth_m=_truth_m(records[_TRUTH], rows).reshape(-1, 3),
+        approach=station.approaches[0] if station.approaches else None,
+        station_id=station.station_id,
+        rests_on=list(statements(station)),
     )
-    write_solution_csv(result.csv, rows)
-    write_json(result.summary_file, result.summary)
-    errors = position_errors(rows, truth, course_rad=course_rad)
-    runway = f" to runway {approach.runway}" if approach else ""
-    plot_approach(
-        [solution for solution, _ in pairs],
-        [protection for _, protection in pairs],
-        result.picture,
-        title=f"Simulated approach{runway}, station {station.station_id}, service type C",
-        errors_m=(errors.vertical_m, errors.lateral_m),
-    )
-    return result
 
 
 def _key(record: Record) -> int:

@@ -16,6 +16,7 @@ from typing import Final
 import numpy as np
 
 from gbas_ground.gradient_claim import MAX_M_EIG, MAX_Y_EIG_M
+from gbas_ground.ionosphere.protection import protection_in_words
 from gbas_ground.orbit_claim import MAX_DECORRELATION, claimed_decorrelation, supported_decorrelation
 from gbas_ground.params import GCID_UNHEALTHY, MAX_SIGMA_VIG, TYPE_D_GCID, GroundParams
 
@@ -68,6 +69,7 @@ def unsupported(params: GroundParams) -> Iterator[str]:
         ("acceleration", monitors.acceleration.exclude),
         ("gradient", monitors.gradient.exclude and params.n_receivers > 1),
         ("power", monitors.power.exclude and params.require_cn0),
+        ("expected_power", monitors.expected_power.exclude and params.require_cn0),
         ("sigma_monitor", monitors.sigma.exclude),
     ):
         if not acts:
@@ -112,7 +114,7 @@ def statements(params: GroundParams) -> tuple[str, ...]:
         _nominal_ionosphere(params),
         _orbits(params),
         *_gradients(params),
-        _ionosphere_threat(params),
+        protection_in_words(params),
         _receivers(params),
         _designator(params),
     )
@@ -145,11 +147,6 @@ def _gradients(params: GroundParams) -> tuple[str, ...]:
         return ()
     how = "gradient monitor" if _bounds_gradients(params) else "largest"
     return (f"Y_EIG {params.y_eig_m:g} m, M_EIG {1e3 * params.m_eig:g} m/km ({how})",)
-
-
-def _ionosphere_threat(params: GroundParams) -> str:
-    """Fronts that have not reached the station: what screens the geometries of the aircraft's satellites."""
-    return "no ionosphere threat model"
 
 
 def _receivers(params: GroundParams) -> str:

@@ -36,8 +36,9 @@ def read_text(path: Path, notes: list[str]) -> str:
         raise RinexError(path, "is empty; expected a RINEX file")
     text = re.sub(rb"[^\x00-\x7f]", b"?", data).decode("ascii").replace("\r\n", "\n")
     if not text.endswith("\n") and is_whole(text):
+        notes.append("the last line has no end; its values are all there, so it was kept")
         text += "\n"
-    if not text.endswith("\n"):
+    elif not text.endswith("\n"):
         notes.append("the last line has no end: it was taken for cut off and left out")
         text = text[: text.rfind("\n") + 1] or text
     return text
