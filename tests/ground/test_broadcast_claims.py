@@ -23,7 +23,7 @@ def test_a_station_that_knows_nothing_says_so() -> None:
         "designator A (assumed)",
         "sigma_vig 25.5 mm/km (largest)",
         "P 0.001275 (not monitored)",
-        "no ionosphere threat model",
+        "no threat model of ionospheric fronts: protection levels do not bound errors in a front",
         "1 receiver: no B values",
         "gcid 7: no service",
     )

@@ -9,9 +9,9 @@ from gbas_core.satellites import N_SATS
 from gbas_core.signals import IONO_RATIO, L1, L5, WAVELENGTH_M
 from gbas_ground.monitors.double_difference import DoubleDifferences, baselines_of
 from gbas_ground.monitors.shared_receiver import across_m, planes_of, seen_quiet, shared_receiver
-from monitor_scenes import BRAUNSCHWEIG_M
+from monitor_scenes import DEMO_SITE_M
 
-SITE = baselines_of(BRAUNSCHWEIG_M, BRAUNSCHWEIG_M.mean(axis=0))
+SITE = baselines_of(DEMO_SITE_M, DEMO_SITE_M.mean(axis=0))
 BANDS = (L1, L5)
 PLANES = planes_of(SITE, BANDS)
 SIGMA_M, K = np.array([0.006, 0.011])[:, np.newaxis], 6.4
@@ -60,8 +60,8 @@ def test_gains_bound_what_a_plane_can_do():
             size = np.abs(SITE.vector_m[:, 0] * np.sin(turn) + SITE.vector_m[:, 1] * np.cos(turn))
             largest = max(largest, size[own].min() / size[~own].max())
         assert largest <= planes.gain
-    line = BRAUNSCHWEIG_M[0] + np.arange(4.0)[:, None] * (BRAUNSCHWEIG_M[1] - BRAUNSCHWEIG_M[0])
-    for places in (BRAUNSCHWEIG_M[:3], line):
+    line = DEMO_SITE_M[0] + np.arange(4.0)[:, None] * (DEMO_SITE_M[1] - DEMO_SITE_M[0])
+    for places in (DEMO_SITE_M[:3], line):
         assert all(np.isinf(each.gain) for each in planes_of(baselines_of(places, places[0]), BANDS))
 
 
@@ -138,7 +138,7 @@ def test_width_of_pierce_points():
 
 def test_with_two_or_three_receivers_nobody_is_named():
     for count in (1, 2, 3):
-        site = baselines_of(BRAUNSCHWEIG_M[:count], BRAUNSCHWEIG_M[0])
+        site = baselines_of(DEMO_SITE_M[:count], DEMO_SITE_M[0])
         at = np.zeros((count, 2, N_SATS))
         at[-1] = 0.07
         assert not found(made(at, baselines=site), site, planes_of(site, BANDS)).receivers.failed.any()

@@ -36,6 +36,8 @@ BRAUNSCHWEIG_M = np.array(
     ]
 )
 """Table 1 of the test bed's paper, and its fourth receiver: 77 m from the first towards the second."""
+DEMO_SITE_M = np.vstack([BRAUNSCHWEIG_M[:3], [3840882.0, 715289.0, 5024753.0]])
+"""The same three, and the fourth of the shipped configurations, about 440 m from each of them."""
 RUNWAY_RAD = np.radians(84.73)
 
 

@@ -49,11 +49,12 @@ def observed(tow_s: float) -> ObservationEpoch:
 
 
 def bad_tables(schema: Any, record: Any) -> list[tuple[Float64MultiArray, str]]:
+    known, later = f"{schema.identifier}:", f"gbas/{schema.name}/{schema.version + 1}:"
     return [
         (table(schema, record, gps_week=np.nan), "gps_week is nan"),
         (table(schema, record, tow_s=np.nan), "tow_s is nan"),
         (table(schema, record, tow_s=1e9), "tow_s is 1000000000.0"),
-        (labelled(table(schema, record), schema.label.replace("/1:", "/2:")), f"gbas/{schema.name}/2"),
+        (labelled(table(schema, record), schema.label.replace(known, later)), later.removesuffix(":")),
         (labelled(table(schema, record), schema.label + ",more"), "columns, expected"),
         (labelled(table(schema, record), ""), "schema ''"),
         (shortened(table(schema, record)), "numbers, expected"),

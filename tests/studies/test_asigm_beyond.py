@@ -57,14 +57,20 @@ def test_coverage_along_the_runway_is_that_of_the_projected_lengths():
 
 
 def test_the_papers_fourth_receiver():
-    """77 m from RR1, on the line to RR2, and where the shipped configuration has it."""
+    """77 m from RR1, on the line to RR2, and where a shipped configuration has it; the demo has it off that line."""
     towards = testbed.RECEIVERS_ECEF_M[1] - testbed.RECEIVERS_ECEF_M[0]
     place = testbed.FOURTH_ECEF_M - testbed.RECEIVERS_ECEF_M[0]
     assert np.linalg.norm(place) == pytest.approx(77.0, abs=1e-3)  # positions are rounded to millimetres
     assert np.linalg.norm(np.cross(place, towards)) / np.linalg.norm(towards) < 1e-3
-    station = GroundParams.from_yaml(config_path("braunschweig.yaml"))
-    np.testing.assert_array_equal(station.receiver_positions_m()[:3], testbed.RECEIVERS_ECEF_M)
-    np.testing.assert_array_equal(station.receiver_positions_m()[3], testbed.FOURTH_ECEF_M)
+    paper, demo = (
+        GroundParams.from_mapping(read_sections(config_path(name))["ground"]).receiver_positions_m()
+        for name in ("scenarios/paper_site.yaml", "braunschweig.yaml")
+    )
+    for positions_m in (paper, demo):
+        np.testing.assert_array_equal(positions_m[:3], testbed.RECEIVERS_ECEF_M)
+    np.testing.assert_array_equal(paper[3], testbed.FOURTH_ECEF_M)
+    off_line_m = np.linalg.norm(np.cross(demo[3] - demo[0], towards)) / np.linalg.norm(towards)
+    assert off_line_m > 200.0  # no three in a line: a wrong receiver is no gradient
 
 
 def test_projection_section():

@@ -44,12 +44,12 @@ from gbas_studies.ccd.monitors import TAU_S
 from gbas_studies.ccd.recorded import MonitoredSeries, Observer, monitor_epochs
 
 T_S: Final = 0.5
-# Published: antennas of an experimental station at Braunschweig, and where its operators propose a fourth.
+# Published: antennas of an experimental station at Braunschweig; the fourth is ours.
 ANTENNAS_M: Final = (
     (3840619.039, 715604.228, 5024909.863),
     (3840835.113, 714861.969, 5024848.587),
     (3841202.939, 715429.959, 5024488.675),
-    (3840640.493, 715530.528, 5024903.779),
+    (3840882.0, 715289.0, 5024753.0),
 )
 TROPOSPHERE: Final = Troposphere(refractivity=330.0, scale_height_m=7900.0)
 ZENITH_DELAY_M: Final = 330.0e-6 * 7900.0
