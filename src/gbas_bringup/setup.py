@@ -7,7 +7,7 @@ PACKAGE = "gbas_bringup"
 setup(
     name=PACKAGE,
     version="0.1.0",
-    description="Launch files, site configurations, the gbas command, recorder and player.",
+    description="Starting the nodes: launch files, site configurations and scenarios, launcher.",
     license="Apache-2.0",
     maintainer="GBAS suite developers",
     maintainer_email="dev@example.org",
@@ -21,30 +21,6 @@ setup(
         (f"share/{PACKAGE}/config", sorted(glob("config/*.yaml"))),
         (f"share/{PACKAGE}/config/scenarios", sorted(glob("config/scenarios/*.yaml"))),
     ],
-    install_requires=[
-        "gbas_core",
-        "gbas_msgs_py",
-        "gbas_ground",
-        "gbas_airborne",
-        "gbas_sim",
-        "gbas_studies",
-        "numpy",
-        "matplotlib",
-        "mcap",
-        "lz4",
-        "zstandard",
-        "rosbags",
-        "rich",
-        "typer",
-        "PyYAML",
-    ],
-    extras_require={"bench": ["pyrtklib"]},  # gbas bench compares with it
+    install_requires=["gbas_core", "gbas_msgs_py", "gbas_node", "gbas_sim", "rich", "PyYAML"],
     zip_safe=True,
-    entry_points={
-        "console_scripts": [
-            "gbas = gbas_bringup.cli:main",
-            "recorder = gbas_bringup.recorder:main",
-            "player = gbas_bringup.player:main",
-        ]
-    },
 )

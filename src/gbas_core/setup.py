@@ -5,7 +5,7 @@ PACKAGE = "gbas_core"
 setup(
     name=PACKAGE,
     version="0.1.0",
-    description="GNSS algorithms both ends share: time, frames, orbits, smoothing, error models, RINEX.",
+    description="GNSS algorithms both ends share: time, frames, orbits, smoothing, antennas, RINEX, RTCM 3.",
     license="Apache-2.0",
     maintainer="GBAS suite developers",
     maintainer_email="dev@example.org",
@@ -16,6 +16,6 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         (f"share/{PACKAGE}", ["package.xml"]),
     ],
-    install_requires=["numpy", "scipy", "numba", "sidereon"],
+    install_requires=["numba", "numpy", "scipy", "sidereon"],
     zip_safe=True,
 )

@@ -5,17 +5,17 @@ PACKAGE = "gbas_msgs_py"
 setup(
     name=PACKAGE,
     version="0.1.0",
-    description="The contract between the nodes: topics, QoS, tables in std_msgs, and the VDB codec.",
+    description="The contract between the nodes: topics, QoS, records and their tables in std_msgs, events.",
     license="Apache-2.0",
     maintainer="GBAS suite developers",
     maintainer_email="dev@example.org",
     python_requires=">=3.11",
     packages=find_packages(include=[PACKAGE, f"{PACKAGE}.*"]),
-    package_data={PACKAGE: ["py.typed", "*.xml"]},
+    package_data={PACKAGE: ["py.typed"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         (f"share/{PACKAGE}", ["package.xml"]),
     ],
-    install_requires=["gbas_core", "numpy", "reedsolo"],
+    install_requires=["gbas_core", "gbas_vdb", "numpy"],
     zip_safe=True,
 )

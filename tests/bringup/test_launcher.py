@@ -20,11 +20,11 @@ import yaml
 
 from gbas_bringup import launcher as module
 from gbas_bringup.environment import ament_prefix_path, free_domain, process_environment
-from gbas_bringup.errors import GbasError, NodeDied
 from gbas_bringup.launcher import Interrupted, Launcher, RunPlan
 from gbas_bringup.node_kinds import NODE_KINDS, NodeInstance, Stage
 from gbas_bringup.run_config import RunConfig
 from gbas_bringup.single_process import factory_of, split_arguments
+from gbas_core.errors import GbasError, NodeDied
 
 PATIENT = """
 import signal, sys, time

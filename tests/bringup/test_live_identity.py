@@ -8,14 +8,14 @@ from typing import Any
 import pytest
 import yaml
 
-from gbas_bringup.bag_records import read_records
+from gbas_bags.records import read_records
 from gbas_bringup.environment import free_domain
 from gbas_bringup.launcher import RunPlan
-from gbas_bringup.process import ProcessResult, process, write_results
-from gbas_bringup.replay import ReplayRequest, replay
-from gbas_bringup.results import Row, write_solution_csv
 from gbas_bringup.run_config import read_run_config
 from gbas_bringup.runs import execute
+from gbas_chain.process import ProcessResult, process, write_results
+from gbas_chain.results import Row, write_solution_csv
+from gbas_cli.replay import ReplayRequest, replay
 from gbas_msgs_py import tables, topics
 from gbas_msgs_py.records import ProtectionEpoch, SolutionEpoch
 from recorded_sets import request

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from gbas_bringup.bag_check import check
-from gbas_bringup.bags import info, recover
+from gbas_bags.bags import info, recover
+from gbas_bags.check import check
 
 pytestmark = pytest.mark.ros
 
@@ -23,7 +23,7 @@ class Run:
     """``gbas run braunschweig``, faster than real time but not over before a test is."""
 
     def __init__(self, out: Path, domain: int, *options: str) -> None:
-        command = [sys.executable, "-m", "gbas_bringup.cli", "run", "braunschweig", "--out", str(out)]
+        command = [sys.executable, "-m", "gbas_cli.main", "run", "braunschweig", "--out", str(out)]
         command += ["--speed", "20", "--isolated", "--domain", str(domain), *options]
         self.bag = out / "bag"
         self.popen = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
@@ -92,7 +92,7 @@ def test_killed_node_is_named_and_the_bag_is_closed(run: Callable[..., Run]) -> 
 
 def test_killed_recorder_is_named_and_the_bag_can_be_saved(run: Callable[..., Run]) -> None:
     process = run()
-    subprocess.run(["kill", "-9", str(process.node("gbas_bringup.recorder"))], check=True)
+    subprocess.run(["kill", "-9", str(process.node("gbas_bags.recorder"))], check=True)
     code, _, err = process.end()
     assert code == 1
     assert "node recorder was killed by signal 9" in err

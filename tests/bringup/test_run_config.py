@@ -8,11 +8,11 @@ import pytest
 import yaml
 
 from gbas_airborne.params import AirborneParams
-from gbas_bringup.errors import ConfigError
 from gbas_bringup.launcher import RunPlan, commands, launch_parameters
 from gbas_bringup.node_kinds import NODE_KINDS, NodeInstance, Stage
 from gbas_bringup.resources import config_path, named_config, resources
 from gbas_bringup.run_config import one_driver, read_run_config
+from gbas_core.errors import ConfigError
 from gbas_ground.params import GroundParams
 from gbas_sim.scenario import scenario_from_yaml
 

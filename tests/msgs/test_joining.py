@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gbas_core.gpstime import epoch_key, from_epoch_key
+from gbas_core.gnss.gpstime import epoch_key, from_epoch_key
 from gbas_msgs_py.joining import (
     MAX_WAITING_BURSTS,
     RESTART_AFTER_LATE,
@@ -19,7 +19,7 @@ from gbas_msgs_py.joining import (
     JoinedEpoch,
     ReceptionQueue,
 )
-from gbas_msgs_py.vdb.burst import Burst
+from gbas_vdb.transmission.burst import Burst
 
 START = epoch_key(2300, 1000.0)
 

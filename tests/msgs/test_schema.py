@@ -14,7 +14,7 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gbas_core.observations import ObservationEpoch
+from gbas_core.gnss.observations import ObservationEpoch
 from gbas_core.record import columns_of
 from gbas_core.satellites import N_SATS, RANGING_SOURCE_ID
 from gbas_msgs_py import tables

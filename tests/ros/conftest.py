@@ -28,7 +28,7 @@ from std_msgs.msg import Float64MultiArray, String, UInt8MultiArray
 
 from gbas_msgs_py import ros, tables, topics
 from gbas_msgs_py.qos import DATA, qos_of
-from gbas_msgs_py.transport import use_profile
+from gbas_node.transport import use_profile
 
 DOMAINS = range(60, 100)
 START_S = 60.0

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from std_msgs.msg import Float64MultiArray, UInt8MultiArray
 
-from gbas_core.observations import ObservationEpoch
+from gbas_core.gnss.observations import ObservationEpoch
 from gbas_msgs_py import ros, tables, topics
 from gbas_msgs_py.records import IntegrityEpoch, SolutionEpoch
-from gbas_msgs_py.vdb.burst import Burst
+from gbas_vdb.transmission.burst import Burst
 
 pytestmark = pytest.mark.ros
 

@@ -15,11 +15,11 @@ from sensor_msgs.msg import NavSatFix
 from std_msgs.msg import Float64, UInt8
 
 from gbas_airborne.params import AirborneParams
-from gbas_core.recording import RecordedEpoch, Recording
+from gbas_chain.chain import AirborneOutput, Chain, GroundOutput
+from gbas_core.io.recording import RecordedEpoch, Recording
 from gbas_ground.params import GroundParams
 from gbas_msgs_py import tables, topics
 from gbas_msgs_py.events import EventKind
-from gbas_studies.chain import AirborneOutput, Chain, GroundOutput
 
 pytestmark = pytest.mark.ros
 

@@ -16,13 +16,13 @@ from sensor_msgs.msg import NavSatFix
 from std_msgs.msg import Float64, UInt8, UInt8MultiArray
 
 from gbas_airborne.params import AirborneParams
-from gbas_core.ephemeris import Ephemeris
-from gbas_core.recording import RecordedEpoch, Recording
+from gbas_chain.chain import Chain, GroundOutput
+from gbas_core.gnss.ephemeris import Ephemeris
+from gbas_core.io.recording import RecordedEpoch, Recording
 from gbas_ground.params import GroundParams
 from gbas_msgs_py import ros, tables, topics
 from gbas_msgs_py.events import EventKind
 from gbas_msgs_py.records import ProtectionEpoch, ServiceType, SolutionEpoch
-from gbas_studies.chain import Chain, GroundOutput
 
 pytestmark = pytest.mark.ros
 

@@ -16,7 +16,7 @@ from std_msgs.msg import String
 
 from gbas_airborne.nodes.positioning import Positioning
 from gbas_airborne.nodes.protection_level import ProtectionLevel
-from gbas_core.observations import ObservationEpoch
+from gbas_core.gnss.observations import ObservationEpoch
 from gbas_ground.nodes.correction_broadcast import CorrectionBroadcast
 from gbas_ground.nodes.integrity_monitor import IntegrityMonitor
 from gbas_ground.nodes.receiver_replay import ReceiverReplay

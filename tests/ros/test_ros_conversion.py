@@ -18,13 +18,13 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import NavSatFix, NavSatStatus
 from std_msgs.msg import Float64, Float64MultiArray, MultiArrayDimension, UInt8, UInt8MultiArray
 
-from gbas_core.frames import ecef_from_geodetic
-from gbas_core.observations import ObservationEpoch
+from gbas_core.gnss.frames import ecef_from_geodetic
+from gbas_core.gnss.observations import ObservationEpoch
 from gbas_msgs_py import cdr, ros, tables, topics
 from gbas_msgs_py.qos import qos_of
 from gbas_msgs_py.records import SolutionEpoch
 from gbas_msgs_py.schema import SchemaError
-from gbas_msgs_py.vdb.burst import Burst
+from gbas_vdb.transmission.burst import Burst
 
 
 def observations() -> ObservationEpoch:

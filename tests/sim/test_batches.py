@@ -9,7 +9,7 @@ from gbas_bringup.resources import config_path
 from gbas_core.satellites import SAT_INDEX
 from gbas_core.signals import L1, L5
 from gbas_sim.batches import QUANTITIES, batches, observed
-from gbas_sim.faults import FAULT_MODES
+from gbas_sim.faults.kinds import FAULT_MODES
 from gbas_sim.scenario import open_world, read_sections, scenario_from_mapping
 from gbas_sim.world import World
 

@@ -13,10 +13,10 @@ import yaml
 
 rclpy = pytest.importorskip("rclpy")
 
-from gbas_core.gpstime import epoch_key  # noqa: E402
-from gbas_core.observations import ObservationEpoch  # noqa: E402
+from gbas_core.gnss.gpstime import epoch_key  # noqa: E402
+from gbas_core.gnss.observations import ObservationEpoch  # noqa: E402
 from gbas_msgs_py import tables, topics  # noqa: E402
-from gbas_msgs_py.node import GbasNode, NodeParams  # noqa: E402
+from gbas_node.node import GbasNode, NodeParams  # noqa: E402
 from gbas_sim.nodes.simulator import Simulator  # noqa: E402
 from gbas_sim.scenario import scenario_from_mapping  # noqa: E402
 from gbas_sim.world import World  # noqa: E402

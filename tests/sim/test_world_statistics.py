@@ -14,16 +14,16 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from gbas_core.error_models import iono_obliquity
+from gbas_core.models.error_models import iono_obliquity
 from gbas_core.satellites import IS_GPS, N_SATS, SAT_INDEX
+from gbas_core.signal.tracking_loops import TrackingParams
 from gbas_core.signals import IONO_RATIO, L1, L5, SPEED_OF_LIGHT_MPS, WAVELENGTH_M
-from gbas_sim.fronts import WedgeFront
-from gbas_sim.ionosphere import IonosphereParams
-from gbas_sim.presets import ground_receiver
-from gbas_sim.receiver_model import ReceiverModel
-from gbas_sim.receivers import GROUND_RECEIVER, ReceiverParams
-from gbas_sim.signal_faults import FAULT_MODES, CodeCarrierDivergence
-from gbas_sim.tracking import TrackingParams
+from gbas_sim.atmosphere.fronts import WedgeFront
+from gbas_sim.atmosphere.ionosphere import IonosphereParams
+from gbas_sim.faults.signal_faults import FAULT_MODES, CodeCarrierDivergence
+from gbas_sim.receivers.presets import ground_receiver
+from gbas_sim.receivers.receiver import GROUND_RECEIVER, ReceiverParams
+from gbas_sim.receivers.receiver_model import ReceiverModel
 from gbas_sim.world import World, WorldParams
 
 SITES = (

@@ -8,7 +8,7 @@ from scipy.stats import norm
 
 from gbas_bringup.resources import config_path
 from gbas_core.signals import L1, L5, WAVELENGTH_M
-from gbas_ground.gradient_detectability import GRADIENT_RANGE, BaselineMonitor, coverage_percent
+from gbas_ground.monitors.gradient_detectability import GRADIENT_RANGE, BaselineMonitor, coverage_percent
 from gbas_ground.params import GroundParams
 from gbas_sim.scenario import read_sections, scenario_from_yaml
 from gbas_studies.asigm import coverage, projection, testbed

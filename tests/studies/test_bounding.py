@@ -7,9 +7,8 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import binomtest
 
-from gbas_airborne.position import CLOCK_GROUPS
-from gbas_core.satellites import N_SATS
-from gbas_core.wls import projection_matrix, vertical_lateral
+from gbas_core.positioning.wls import projection_matrix, vertical_lateral
+from gbas_core.satellites import CLOCK_GROUPS, N_SATS
 from gbas_msgs_py.records import SolutionEpoch
 from gbas_studies.bounding import (
     BoundingReport,
@@ -137,7 +136,7 @@ def solution_of(
     generator: np.random.Generator, truth: np.ndarray, k: int
 ) -> tuple[SolutionEpoch, np.ndarray, np.ndarray]:
     """A least squares solution of five GPS and three Galileo satellites with known errors and clocks."""
-    from gbas_core.frames import geodetic_from_ecef, rot_enu_ecef
+    from gbas_core.gnss.frames import geodetic_from_ecef, rot_enu_ecef
 
     used = np.flatnonzero(CLOCK_GROUPS[0])[:5].tolist() + np.flatnonzero(CLOCK_GROUPS[1])[:3].tolist()
     azimuth = np.full(N_SATS, np.nan)

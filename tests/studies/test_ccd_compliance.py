@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import ncx2, norm
 
 from divergence_loops import GAMMA_L5, ccd_statistic, four_statistics, hatch
-from gbas_core.fault_modes import FAULT_MODES, FAULT_SIGNS
+from gbas_core.ranging.fault_modes import FAULT_MODES, FAULT_SIGNS
 from gbas_ground.monitors.divergence_covariance import PRINTED_COVARIANCE
 from gbas_studies.ccd import compliance, compliance_items
 from gbas_studies.ccd.compliance import USERS, cell, cells

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gbas_core.divergence import GROUND
-from gbas_core.fault_modes import FAULT_MODES
+from gbas_core.ranging.divergence import GROUND
+from gbas_core.ranging.fault_modes import FAULT_MODES
 from gbas_studies.ccd.injected import (
     campaign,
     front_over_station,

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, ncx2, norm
 
-from gbas_core.divergence import GROUND, DivergenceParams, white_noise_gain
-from gbas_core.fault_modes import fault_direction
+from gbas_core.ranging.divergence import GROUND, DivergenceParams, white_noise_gain
+from gbas_core.ranging.fault_modes import fault_direction
 from gbas_studies.ccd.missed_detection import (
     critical_mapping_gast_d,
     critical_mapping_gast_f,

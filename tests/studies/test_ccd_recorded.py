@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gbas_core.divergence import GROUND
-from gbas_core.recording import RecordedEpoch
-from gbas_core.rtcm import read_rtcm
+from gbas_core.io.recording import RecordedEpoch
+from gbas_core.io.rtcm import read_rtcm
+from gbas_core.ranging.divergence import GROUND
 from gbas_core.satellites import SAT_INDEX
 from gbas_ground.monitors.code_carrier_divergence import CcdParams
 from gbas_ground.monitors.two_frequency_divergence import TwoFrequencyParams, threshold

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from divergence_loops import ccd_statistic, differential_error
-from gbas_core.divergence import ramp_response
-from gbas_core.fault_modes import FAULT_MODES
+from gbas_core.ranging.divergence import ramp_response
+from gbas_core.ranging.fault_modes import FAULT_MODES
 from gbas_studies.ccd import station_items
 from gbas_studies.ccd.monitors import MONITORS, cmc_rate, monitor_for
 from gbas_studies.ccd.smoothed_error import (

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from gbas_bringup.resources import named_config
-from gbas_core.smoothing import SmoothingParams, initial_smoothing, smooth_step
+from gbas_core.ranging.smoothing import SmoothingParams, initial_smoothing, smooth_step
 from gbas_ground.params import GroundParams
-from gbas_sim.faults import CodeCarrierDivergence, ExcessiveAcceleration
+from gbas_sim.faults.kinds import CodeCarrierDivergence, ExcessiveAcceleration
 from gbas_sim.scenario import read_sections, scenario_from_yaml
 from gbas_studies.ccd.smoothed_error import Smoothing, StudyError, largest_error_s
 from gbas_studies.faults.campaign import KINDS, QUIET_S, WORLD_S, cases_of, run_campaign

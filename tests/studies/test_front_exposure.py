@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gbas_core.divergence import AIRBORNE, divergence_step, initial_divergence
-from gbas_core.smoothing import SmoothingParams, initial_smoothing, smooth_step
+from gbas_core.ranging.divergence import AIRBORNE, divergence_step, initial_divergence
+from gbas_core.ranging.smoothing import SmoothingParams, initial_smoothing, smooth_step
 from gbas_studies.ccd.smoothed_error import LONG_BEFORE, Smoothing, StudyError
 from gbas_studies.faults.campaign import front_cases
 from gbas_studies.faults.front_exposure import front_limit, slope_error_s

@@ -13,10 +13,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gbas_bringup.cli_study_fronts import plan_of
-from gbas_bringup.errors import GbasError
+from gbas_cli.study_fronts import plan_of
+from gbas_core.errors import GbasError
 from gbas_core.satellites import SAT_INDEX
-from gbas_sim.fronts import WedgeFront
+from gbas_sim.atmosphere.fronts import WedgeFront
 from gbas_studies.fronts.campaign import KINDS, Run, _run_chunk, draw, judge, prepare, run_campaign
 from gbas_studies.fronts.quiet import fly
 from gbas_studies.fronts.response import delay_m, divergence_mps, range_errors, respond, smoothed_m

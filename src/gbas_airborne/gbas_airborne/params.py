@@ -14,10 +14,10 @@ from typing import Any, Final
 
 import yaml
 
+from gbas_core.parameters import ParameterError, field_types, parameters_from, require
+from gbas_core.ranging.slips import NORMAL_MANOEUVRE_JERK_MPS3
 from gbas_core.satellites import SYSTEM_MASKS
-from gbas_core.slips import NORMAL_MANOEUVRE_JERK_MPS3
-from gbas_msgs_py.parameters import ParameterError, field_types, parameters_from, require
-from gbas_msgs_py.vdb.burst import SLOT_NAMES
+from gbas_vdb.transmission.burst import SLOT_NAMES
 
 NO_FAS: Final = -1
 MAX_RPDS: Final = 48

@@ -14,30 +14,30 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from gbas_airborne.corrections import (
+from gbas_airborne.navigation.guidance import approach_columns, guidance_columns
+from gbas_airborne.navigation.position import Attempt, Fix, PositionInputs, Speed, tested_position
+from gbas_airborne.params import AirborneParams
+from gbas_airborne.ranging.corrected_ranges import (
     RangingSources,
     Rejection,
     SmoothedRanges,
     millisecond_step_m,
     ranging_sources,
 )
-from gbas_airborne.guidance import approach_columns, guidance_columns
-from gbas_airborne.params import AirborneParams
-from gbas_airborne.position import Attempt, Fix, PositionInputs, Speed, tested_position
-from gbas_airborne.reception import SOURCE, ReceptionState, reception_step
+from gbas_airborne.reception.vdb_messages import SOURCE, ReceptionState, reception_step
 from gbas_airborne.service import ServiceState, service_step
-from gbas_core.ephemeris import Ephemeris, EphemerisStore
-from gbas_core.gpstime import epoch_key, seconds_between
-from gbas_core.observations import LARGEST_OBSERVATION, ObservationEpoch
+from gbas_core.gnss.ephemeris import Ephemeris, EphemerisStore
+from gbas_core.gnss.gpstime import epoch_key, seconds_between
+from gbas_core.gnss.observations import LARGEST_OBSERVATION, ObservationEpoch
+from gbas_core.ranging.slips import SlipParams, SlipState, initial_slips, slip_step
+from gbas_core.ranging.smoothing import SmoothingParams, SmoothingState, initial_smoothing, smooth_step
 from gbas_core.record import FloatArray
 from gbas_core.satellites import SAT_IDS, missing
 from gbas_core.signals import L1
-from gbas_core.slips import SlipParams, SlipState, initial_slips, slip_step
-from gbas_core.smoothing import SmoothingParams, SmoothingState, initial_smoothing, smooth_step
 from gbas_msgs_py.events import Event, EventKind
 from gbas_msgs_py.records import ProtectionEpoch, SolutionEpoch
-from gbas_msgs_py.vdb.burst import Burst
-from gbas_msgs_py.vdb.ephemeris_crc import ephemeris_crcs
+from gbas_vdb.messages.ephemeris_crc import ephemeris_crcs
+from gbas_vdb.transmission.burst import Burst
 
 # A time constant of zero means no smoothing; the filter wants a positive one.
 _NO_SMOOTHING_S: Final = 1e-9

@@ -16,11 +16,11 @@ from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Final, NamedTuple
 
-from gbas_airborne.guidance import alert_limits_m
+from gbas_airborne.navigation.guidance import alert_limits_m
 from gbas_airborne.params import NO_FAS, AirborneParams
-from gbas_airborne.protection import NOT_PROTECTED, Multipliers, ProtectionLevels, protection_levels
-from gbas_airborne.reception import HEALTHY_GCID
-from gbas_core.approach import APD_C, APD_CD
+from gbas_airborne.protection.levels import NOT_PROTECTED, Multipliers, ProtectionLevels, protection_levels
+from gbas_airborne.reception.vdb_messages import HEALTHY_GCID
+from gbas_core.positioning.approach import APD_C, APD_CD
 from gbas_msgs_py.events import Event, EventKind
 from gbas_msgs_py.records import ProtectionEpoch, ServiceType, SolutionEpoch
 

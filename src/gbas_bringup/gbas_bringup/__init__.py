@@ -1,3 +1,3 @@
-"""Running the suite: the ``gbas`` command, launcher, recorder, player and bags."""
+"""Starting the nodes: configurations, launcher, launch files, and what the processes need around them."""
 
 __version__ = "0.1.0"

@@ -11,10 +11,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import IO, Final
 
-import numpy as np
-
-from gbas_bringup.errors import GbasError
-from gbas_msgs_py.transport import use_profile
+from gbas_core.errors import GbasError
+from gbas_node.transport import use_profile
 
 MAX_DOMAIN: Final = 232
 _FREE_DOMAINS: Final = range(20, 60)
@@ -103,9 +101,3 @@ def _in_use(domain: int) -> bool:
         except OSError:
             return True
     return False
-
-
-def vector_instructions() -> str:
-    """Vector instructions numpy computes with here; the last bits of sines depend on them."""
-    found = np.show_config(mode="dicts")["SIMD Extensions"]  # type: ignore[index]  # a dictionary in this mode
-    return ",".join([*found.get("baseline", ()), *found.get("found", ())])

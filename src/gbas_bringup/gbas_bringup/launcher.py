@@ -23,9 +23,9 @@ from typing import IO, Any, Final
 import yaml
 
 from gbas_bringup.environment import process_environment
-from gbas_bringup.errors import EXIT_BAD_INPUT, EXIT_INTERRUPTED, GbasError, NodeDied
 from gbas_bringup.node_kinds import NodeInstance, Stage
 from gbas_bringup.run_config import RunConfig, one_driver
+from gbas_core.errors import EXIT_BAD_INPUT, EXIT_INTERRUPTED, GbasError, NodeDied
 
 OVERRIDES_FILE: Final = "overrides.yaml"
 START_WAIT_S: Final = 60.0

@@ -14,7 +14,7 @@ from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 
-from gbas_bringup.errors import GbasError
+from gbas_core.errors import GbasError
 from gbas_msgs_py import topics
 
 

@@ -46,7 +46,7 @@ NODE_KINDS: Final[dict[str, NodeKind]] = {
             stage=Stage.DRIVER,
             needs="sim",
         ),
-        NodeKind(name="player", module="gbas_bringup.player", class_name="Player", stage=Stage.DRIVER),
+        NodeKind(name="player", module="gbas_bags.player", class_name="Player", stage=Stage.DRIVER),
         NodeKind(
             name="integrity_monitor",
             module="gbas_ground.nodes.integrity_monitor",
@@ -75,7 +75,7 @@ NODE_KINDS: Final[dict[str, NodeKind]] = {
             stage=Stage.AIRBORNE,
             needs="airborne",
         ),
-        NodeKind(name="recorder", module="gbas_bringup.recorder", class_name="Recorder", stage=Stage.RECORDER),
+        NodeKind(name="recorder", module="gbas_bags.recorder", class_name="Recorder", stage=Stage.RECORDER),
     )
 }
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 
-from gbas_bringup.errors import ConfigError
+from gbas_core.errors import ConfigError
 
 PACKAGE = "gbas_bringup"
 
@@ -70,3 +71,9 @@ def _ament_share() -> Path | None:
         return Path(get_package_share_directory(PACKAGE))
     except (PackageNotFoundError, LookupError, OSError):  # not found, or no AMENT_PREFIX_PATH
         return None
+
+
+def data_folder() -> Path | None:
+    """Folder of recorded data named by ``GBAS_DATA``."""
+    named = os.environ.get("GBAS_DATA")
+    return Path(named) if named else None

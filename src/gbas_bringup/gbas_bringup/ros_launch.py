@@ -16,11 +16,10 @@ from launch.events import Shutdown
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
-from gbas_bringup.cli_base import speed_of
 from gbas_bringup.launcher import RunPlan, launch_parameters
 from gbas_bringup.node_kinds import NODE_KINDS, NodeInstance, Stage
 from gbas_bringup.resources import named_config
-from gbas_bringup.run_config import one_driver, read_run_config
+from gbas_bringup.run_config import one_driver, read_run_config, speed_of
 from gbas_bringup.runs import new_directory
 from launch import LaunchContext, LaunchDescription  # type: ignore[attr-defined]  # there without ROS: our folder
 

@@ -20,8 +20,8 @@ from typing import Any, Final
 
 import yaml
 
-from gbas_bringup.errors import ConfigError
 from gbas_bringup.node_kinds import NODE_KINDS, NodeInstance, Stage
+from gbas_core.errors import ConfigError
 from gbas_msgs_py.topics import DEFAULT_NAMESPACE
 from gbas_sim.scenario import ScenarioError, read_document
 
@@ -203,3 +203,22 @@ def _implied(parameters: Mapping[str, Mapping[str, Any]], *, has_driver: bool) -
     for kind in NODE_KINDS.values():
         if kind.needs in shared and not (kind.stage is Stage.DRIVER and has_driver):
             yield NodeInstance(kind=kind)
+
+
+def speed_of(text: str) -> float:
+    """Speed of a run: ``max`` or a multiple of real time.
+
+    Raises
+    ------
+    ValueError
+        For anything else.
+    """
+    if text == "max":
+        return 0.0
+    try:
+        speed = float(text)
+    except ValueError:
+        speed = -1.0
+    if not 0.0 < speed <= 1e6:
+        raise ValueError(f"{text!r} is neither 'max' nor a multiple of real time above 0, up to 1e6")
+    return speed

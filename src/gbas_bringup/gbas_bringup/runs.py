@@ -9,10 +9,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from gbas_bringup.environment import process_environment
-from gbas_bringup.errors import BagError
 from gbas_bringup.launcher import Launcher, RunPlan
 from gbas_bringup.monitor import Monitor
 from gbas_bringup.progress import progress
+from gbas_core.errors import BagError
 
 _TICK_S = 0.25
 

@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from gbas_core.satellites import missing
 
 FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.int64]
 _KEY: Final = "gbas_column"
 
 

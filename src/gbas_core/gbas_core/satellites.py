@@ -34,6 +34,8 @@ SOURCE_ID_INDEX: Final[dict[int, int]] = {int(source): index for index, source i
 IS_GPS: Final[NDArray[np.bool_]] = np.arange(N_SATS) < N_GPS
 IS_GALILEO: Final[NDArray[np.bool_]] = ~IS_GPS
 SYSTEM_MASKS: Final[dict[str, NDArray[np.bool_]]] = {"G": IS_GPS, "E": IS_GALILEO}
+CLOCK_GROUPS: Final[NDArray[np.bool_]] = np.stack([IS_GPS, IS_GALILEO])
+"""Satellites that share one receiver clock in the corrections: one row a constellation, ``(k, N)``."""
 
 
 def satellites_of(systems: Sequence[str]) -> NDArray[np.bool_]:

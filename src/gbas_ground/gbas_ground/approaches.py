@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 
-from gbas_core.approach import FinalApproach
-from gbas_core.approach_keys import approach_from_mapping
-from gbas_msgs_py.vdb.messages import FasBlock, FasDataSet
+from gbas_core.positioning.approach import FinalApproach
+from gbas_core.positioning.approach_keys import approach_from_mapping
+from gbas_vdb.messages.types import FasBlock, FasDataSet
 
 __all__ = ["approach_from_mapping", "fas_data_set"]
 

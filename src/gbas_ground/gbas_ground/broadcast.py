@@ -12,18 +12,17 @@ from typing import Final
 
 import numpy as np
 
-from gbas_core.gpstime import epoch_key
-from gbas_core.record import FloatArray
+from gbas_core.gnss.gpstime import epoch_key
+from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import IS_GALILEO, RANGING_SOURCE_ID
-from gbas_ground.corrections import BoolArray
+from gbas_ground.claims.orbit_claim import MAX_DECORRELATION
+from gbas_ground.corrections.sigma import MAX_SIGMA_M
 from gbas_ground.monitors.multiple_reference import MAX_B_VALUE_M
-from gbas_ground.orbit_claim import MAX_DECORRELATION
 from gbas_ground.params import GCID_UNHEALTHY, MAX_SIGMA_VIG, MIN_SERVICE_SATELLITES, GroundParams
-from gbas_ground.sigma import MAX_SIGMA_M
 from gbas_msgs_py.records import MAX_REFERENCE_RECEIVERS, ChannelState, IntegrityEpoch
-from gbas_msgs_py.vdb.burst import FRAME_DURATION_S, Burst
-from gbas_msgs_py.vdb.messages import Correction30, Correction100, FasDataSet, Type2
-from gbas_msgs_py.vdb.schedule import (
+from gbas_vdb.messages.types import Correction30, Correction100, FasDataSet, Type2
+from gbas_vdb.transmission.burst import FRAME_DURATION_S, Burst
+from gbas_vdb.transmission.schedule import (
     Frame,
     ScheduleParams,
     ScheduleState,

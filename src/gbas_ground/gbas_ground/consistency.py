@@ -11,18 +11,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gbas_core.record import FloatArray
-from gbas_core.satellites import N_SATS, SAT_IDS
-from gbas_ground import corrections as form
-from gbas_ground.causes import ExclusionCause
-from gbas_ground.corrections import CLOCK_GROUPS, BoolArray
-from gbas_ground.executive import Latch, exclude, initial_latch
-from gbas_ground.looks import Look, look
+from gbas_core.record import BoolArray, FloatArray
+from gbas_core.satellites import CLOCK_GROUPS, N_SATS, SAT_IDS
+from gbas_ground.corrections import formation as form
+from gbas_ground.corrections.sigma import Sigmas, broadcast_sigmas
+from gbas_ground.exclusions import Latch, exclude, initial_latch
 from gbas_ground.monitors.correction_limits import check_correction
+from gbas_ground.monitors.monitor_table import Look, look
 from gbas_ground.monitors.multiple_reference import channel_sigma_m, check_b_values, check_unused
 from gbas_ground.monitors.result import MonitorResult
 from gbas_ground.params import GroundParams
-from gbas_ground.sigma import Sigmas, broadcast_sigmas
+from gbas_msgs_py.codes import ExclusionCause
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -270,7 +269,7 @@ def _worst_limit(made: Corrections, exclusions: Exclusions, params: GroundParams
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Standing:
-    """How what is excluded would do: masks of what was seen to pass, for :func:`gbas_ground.executive.advance`."""
+    """How what is excluded would do: masks of what was seen to pass, for :func:`gbas_ground.exclusions.advance`."""
 
     channels: BoolArray
     receivers: BoolArray

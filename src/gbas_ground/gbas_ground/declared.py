@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, dataclass, field, fields
 from typing import Any, Final
 
-from gbas_msgs_py.parameters import ParameterError, field_types
+from gbas_core.parameters import ParameterError, field_types
 
 REQUIRED: Final = object()
 """Default of a parameter that has none."""

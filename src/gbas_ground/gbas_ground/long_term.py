@@ -11,12 +11,11 @@ from functools import lru_cache
 
 import numpy as np
 
+from gbas_core.record import BoolArray
 from gbas_core.satellites import SAT_IDS
-from gbas_ground.causes import ExclusionCause
 from gbas_ground.consistency import Corrections, Exclusions, Finding
-from gbas_ground.corrections import BoolArray
-from gbas_ground.executive import exclude
-from gbas_ground.looks import Look, look, worst_of
+from gbas_ground.exclusions import exclude
+from gbas_ground.monitors.monitor_table import Look, look, worst_of
 from gbas_ground.monitors.result import MonitorResult
 from gbas_ground.monitors.sigma_monitor import (
     SigmaMonitorParams,
@@ -27,6 +26,7 @@ from gbas_ground.monitors.sigma_monitor import (
     sigma_monitor_step,
 )
 from gbas_ground.params import GroundParams
+from gbas_msgs_py.codes import ExclusionCause
 
 
 @lru_cache(maxsize=8)

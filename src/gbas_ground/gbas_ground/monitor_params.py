@@ -11,7 +11,8 @@ import math
 from dataclasses import dataclass, replace
 from typing import Final
 
-from gbas_core.divergence import (
+from gbas_core.parameters import ParameterError
+from gbas_core.ranging.divergence import (
     GROUND_SIGMA_MPS,
     GROUND_THRESHOLD_MPS,
     DivergenceParams,
@@ -19,18 +20,17 @@ from gbas_core.divergence import (
 )
 from gbas_core.signals import BAND_INDEX, BANDS
 from gbas_ground.declared import Declared, nested, parameter
-from gbas_ground.gradient_detectability import GRADIENT_RANGE, P_MISSED_DETECTION
 from gbas_ground.monitors.carrier_acceleration import STATISTICS, CarrierAccelerationParams
 from gbas_ground.monitors.carrier_noise import CarrierNoise
 from gbas_ground.monitors.code_carrier_divergence import CcdParams
 from gbas_ground.monitors.divergence_covariance import Matrix3, StatisticCovariance
 from gbas_ground.monitors.ephemeris_residual import EphemerisResidualParams
 from gbas_ground.monitors.false_alarm import EPOCH_S, FALSE_EXCLUSION, exposure_probability
+from gbas_ground.monitors.gradient_detectability import GRADIENT_RANGE, P_MISSED_DETECTION
 from gbas_ground.monitors.ionosphere_gradient import IonosphereGradientParams
 from gbas_ground.monitors.power_expectation import PowerExpectationParams
 from gbas_ground.monitors.sigma_monitor import SigmaMonitorParams
 from gbas_ground.monitors.two_frequency_divergence import DEGREES_OF_FREEDOM, Form, TwoFrequencyParams, threshold
-from gbas_msgs_py.parameters import ParameterError
 
 _DEGREE: Final = math.pi / 180.0
 _PROBABILITY: Final = {"low": 1e-12, "high": 0.1}
@@ -84,7 +84,7 @@ class CcdSection(Declared):
         """Parameters of the monitor.
 
         The filters settle with those of the smoothing: after 207 s both have forgotten their start to 1 %
-        (:mod:`gbas_core.divergence`), less than the 230 s of docs/decisions/0002.
+        (:mod:`gbas_core.ranging.divergence`), less than the 230 s of docs/decisions/0002.
         """
         settle_s = max(self.settle_s, smoothing_settle_s)
         filters = DivergenceParams(tau_s=self.tau_s, settle_s=settle_s, max_gap_s=max_gap_s)

@@ -21,30 +21,30 @@ from typing import Any, Final
 import numpy as np
 import yaml
 
-from gbas_core.approach import FinalApproach
-from gbas_core.approach_keys import RECORD_KEY, approach_from_mapping
-from gbas_core.frames import ecef_from_geodetic
+from gbas_core.gnss.frames import ecef_from_geodetic
+from gbas_core.parameters import ParameterError, unknown_parameters
+from gbas_core.positioning.approach import FinalApproach
+from gbas_core.positioning.approach_keys import RECORD_KEY, approach_from_mapping
 from gbas_core.record import FloatArray
 from gbas_core.satellites import SYSTEM_MASKS
 from gbas_ground.approaches import fas_data_set
+from gbas_ground.claims.gradient_claim import MAX_M_EIG, MAX_Y_EIG_M, GradientClaim, gradient_claim
+from gbas_ground.claims.gradient_claim import refuse_smaller as refuse_smaller_gradient
+from gbas_ground.claims.orbit_claim import MAX_DECORRELATION, OrbitSite
+from gbas_ground.claims.orbit_claim import refuse_smaller as refuse_smaller_decorrelation
 from gbas_ground.declared import REQUIRED, Declared, all_specs, arguments_from, flatten, listed, nested, parameter
-from gbas_ground.gradient_claim import MAX_M_EIG, MAX_Y_EIG_M, GradientClaim, gradient_claim
-from gbas_ground.gradient_claim import refuse_smaller as refuse_smaller_gradient
 from gbas_ground.ionosphere.section import IonosphereSection
 from gbas_ground.monitor_params import MonitorParams
 from gbas_ground.monitors.double_difference import baselines_of
 from gbas_ground.monitors.ephemeris_residual import EphemerisResidualParams
 from gbas_ground.monitors.ionosphere_gradient import IonosphereGradientParams, gradient_site
-from gbas_ground.orbit_claim import MAX_DECORRELATION, OrbitSite
-from gbas_ground.orbit_claim import refuse_smaller as refuse_smaller_decorrelation
-from gbas_msgs_py.parameters import ParameterError, unknown_parameters
 from gbas_msgs_py.records import MAX_REFERENCE_RECEIVERS
-from gbas_msgs_py.vdb.block import encode_body
-from gbas_msgs_py.vdb.burst import SLOT_NAMES
-from gbas_msgs_py.vdb.errors import VdbError
-from gbas_msgs_py.vdb.messages import AdditionalBlock1, AdditionalBlock3, AdditionalBlock4, FasDataSet, Type2, Type4
-from gbas_msgs_py.vdb.path_point import trusted_path_point
-from gbas_msgs_py.vdb.schedule import ScheduleParams, sources_that_fit
+from gbas_vdb.errors import VdbError
+from gbas_vdb.messages.block import encode_body
+from gbas_vdb.messages.path_point import trusted_path_point
+from gbas_vdb.messages.types import AdditionalBlock1, AdditionalBlock3, AdditionalBlock4, FasDataSet, Type2, Type4
+from gbas_vdb.transmission.burst import SLOT_NAMES
+from gbas_vdb.transmission.schedule import ScheduleParams, sources_that_fit
 
 _DEGREE: Final = math.pi / 180.0
 ROOT_KEY: Final = "ground"

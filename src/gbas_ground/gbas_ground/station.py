@@ -9,13 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gbas_core.ephemeris import Ephemeris
-from gbas_core.gpstime import epoch_key, seconds_between
-from gbas_core.observations import ObservationEpoch
-from gbas_core.record import FloatArray
+from gbas_core.gnss.ephemeris import Ephemeris
+from gbas_core.gnss.gpstime import epoch_key, seconds_between
+from gbas_core.gnss.observations import ObservationEpoch
+from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import N_SATS, SAT_IDS, satellites_of
 from gbas_core.signals import L1, SPEED_OF_LIGHT_MPS
-from gbas_ground import ephemerides
 from gbas_ground.broadcast import (
     RESTART_AFTER_REFUSED,
     BroadcastState,
@@ -24,9 +23,10 @@ from gbas_ground.broadcast import (
     highest_sent,
     refused_in_a_row,
 )
-from gbas_ground.causes import ExclusionCause
-from gbas_ground.channels import channel_epoch
-from gbas_ground.condition import Condition, conclude, integrity_of, withheld
+from gbas_ground.channels import ephemerides
+from gbas_ground.channels.ephemerides import EphemerisState, initial_ephemerides
+from gbas_ground.channels.predicted_ranges import Expected, Site, expected, site_of
+from gbas_ground.channels.tracking import RawEpoch, TrackGroup, Tracks, initial_tracking, stack, track
 from gbas_ground.consistency import (
     Corrections,
     Exclusions,
@@ -37,11 +37,11 @@ from gbas_ground.consistency import (
     no_exclusions,
     standing,
 )
-from gbas_ground.corrections import BoolArray, range_correction_m
-from gbas_ground.ephemerides import EphemerisState, initial_ephemerides
-from gbas_ground.event_log import EventLog
-from gbas_ground.executive import advance, exclude, release
-from gbas_ground.geometry import Expected, Site, expected, site_of
+from gbas_ground.corrections.formation import range_correction_m
+from gbas_ground.exclusions import advance, exclude, release
+from gbas_ground.executive.channel_table import channel_epoch
+from gbas_ground.executive.event_log import EventLog
+from gbas_ground.executive.satellite_status import Condition, conclude, integrity_of, withheld
 from gbas_ground.ionosphere.position_errors import compile_ahead
 from gbas_ground.ionosphere.protection import (
     IonosphereState,
@@ -52,17 +52,17 @@ from gbas_ground.ionosphere.protection import (
     protect,
 )
 from gbas_ground.long_term import initial_long_term, watch_sigmas
-from gbas_ground.looks import look, monitor_epoch
+from gbas_ground.monitoring import Seen, Watched, WatchState, initial_watch, watch
 from gbas_ground.monitors.expected_range import check_expected_range
+from gbas_ground.monitors.monitor_table import look, monitor_epoch
 from gbas_ground.monitors.result import MonitorResult
 from gbas_ground.monitors.sigma_monitor import SigmaMonitorState
 from gbas_ground.monitors.signal_power import check_signal_power
 from gbas_ground.params import GroundParams
-from gbas_ground.surveillance import Seen, Watched, WatchState, initial_watch, watch
-from gbas_ground.tracking import RawEpoch, TrackGroup, Tracks, initial_tracking, stack, track
+from gbas_msgs_py.codes import ExclusionCause
 from gbas_msgs_py.events import Event, EventKind
 from gbas_msgs_py.records import ChannelEpoch, ChannelState, IntegrityEpoch, MonitorEpoch
-from gbas_msgs_py.vdb.burst import Burst
+from gbas_vdb.transmission.burst import Burst
 
 _Checks = Sequence[tuple[ExclusionCause, MonitorResult]]
 

@@ -16,10 +16,10 @@ from typing import Final, Generic, TypeVar
 
 import numpy as np
 
-from gbas_core.gpstime import MILLISECONDS_PER_WEEK, epoch_key
+from gbas_core.gnss.gpstime import MILLISECONDS_PER_WEEK, epoch_key
 from gbas_core.record import FloatArray, Record
 from gbas_msgs_py.schema import TableSchema
-from gbas_msgs_py.vdb.burst import SLOT_NAMES, Burst
+from gbas_vdb.transmission.burst import SLOT_NAMES, Burst
 
 R = TypeVar("R", bound=Record)
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Final
 
-from gbas_core.gpstime import epoch_key
+from gbas_core.gnss.gpstime import epoch_key
 
 SCHEMA: Final = "gbas/event/1"
 

@@ -1,9 +1,9 @@
 """Joining streams by epoch, without a clock and without ROS.
 
-Epochs are keys: milliseconds since the start of GPS time (:func:`gbas_core.gpstime.epoch_key`). Data decide when an
-epoch is complete; wall-clock deadlines, whose times the caller passes in, decide only when something is missing. What
-is given out depends on the data alone as long as no deadline passes, whatever the order in which streams interleave:
-that is why live, accelerated and offline runs, which all join through this module, agree bit for bit.
+Epochs are keys: milliseconds since the start of GPS time (:func:`gbas_core.gnss.gpstime.epoch_key`). Data decide when
+an epoch is complete; wall-clock deadlines, whose times the caller passes in, decide only when something is missing.
+What is given out depends on the data alone as long as no deadline passes, whatever the order in which streams
+interleave: that is why live, accelerated and offline runs, which all join through this module, agree bit for bit.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final, Generic, TypeVar
 
-from gbas_core.gpstime import epoch_key
-from gbas_msgs_py.vdb.burst import Burst
+from gbas_core.gnss.gpstime import epoch_key
+from gbas_vdb.transmission.burst import Burst
 
 T = TypeVar("T")
 

@@ -2,7 +2,7 @@
 
 Everything is reliable: a lost correction or observation would make a replay differ from the original. Depths are
 finite; a driver that runs faster than real time keeps them from overflowing by flow control
-(:mod:`gbas_msgs_py.pacing`).
+(:mod:`gbas_node.pacing`).
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Records, bursts and events as ROS messages: the only place where the contract meets std_msgs.
 
-Everything here is a pure conversion; nodes, publishers and subscriptions are in :mod:`gbas_msgs_py.node`. Decoders
+Everything here is a pure conversion; nodes, publishers and subscriptions are in :mod:`gbas_node.node`. Decoders
 raise :class:`gbas_msgs_py.schema.SchemaError` (or :class:`gbas_msgs_py.events.EventError`) and never guess.
 """
 
@@ -19,8 +19,8 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import NavSatFix, NavSatStatus
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout, String, UInt8MultiArray
 
-from gbas_core.frames import geodetic_from_ecef
-from gbas_core.gpstime import MILLISECONDS_PER_WEEK
+from gbas_core.gnss.frames import geodetic_from_ecef
+from gbas_core.gnss.gpstime import MILLISECONDS_PER_WEEK
 from gbas_core.record import Record
 from gbas_core.satellites import IS_GALILEO, IS_GPS
 from gbas_msgs_py.cdr import (
@@ -38,7 +38,7 @@ from gbas_msgs_py.qos import Qos
 from gbas_msgs_py.records import SolutionEpoch
 from gbas_msgs_py.schema import SchemaError, TableSchema
 from gbas_msgs_py.tables import schema_dictionary, schema_of
-from gbas_msgs_py.vdb.burst import SLOT_NAMES, Burst
+from gbas_vdb.transmission.burst import SLOT_NAMES, Burst
 
 R = TypeVar("R", bound=Record)
 

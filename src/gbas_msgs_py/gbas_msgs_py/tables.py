@@ -9,8 +9,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from gbas_core.ephemeris import Ephemeris
-from gbas_core.observations import ObservationEpoch
+from gbas_core.gnss.ephemeris import Ephemeris
+from gbas_core.gnss.observations import ObservationEpoch
 from gbas_core.record import Record, scalar
 from gbas_msgs_py.records import ChannelEpoch, IntegrityEpoch, MonitorEpoch, ProtectionEpoch, SolutionEpoch
 from gbas_msgs_py.schema import LABEL_PREFIX, SchemaError, TableSchema

@@ -22,7 +22,7 @@ from gbas_core.signals import N_BANDS
 from gbas_sim.world import World
 
 QUANTITIES: Final = ("code_m", "carrier_m", "doppler_hz", "cn0_dbhz", "lli")
-"""What receivers observe, by the names of :class:`gbas_core.observations.ObservationEpoch`."""
+"""What receivers observe, by the names of :class:`gbas_core.gnss.observations.ObservationEpoch`."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -16,10 +16,10 @@ from typing import Final, TextIO
 
 import numpy as np
 
-from gbas_core.ephemeris import Ephemeris
-from gbas_core.frames import geodetic_from_ecef
-from gbas_core.gpstime import SECONDS_PER_WEEK, calendar_from_gps
-from gbas_core.observations import ObservationEpoch
+from gbas_core.gnss.ephemeris import Ephemeris
+from gbas_core.gnss.frames import geodetic_from_ecef
+from gbas_core.gnss.gpstime import SECONDS_PER_WEEK, calendar_from_gps
+from gbas_core.gnss.observations import ObservationEpoch
 from gbas_core.satellites import IS_GPS, SAT_IDS
 from gbas_core.signals import L1, L5, WAVELENGTH_M
 from gbas_sim.world import SimulatedEpoch, Truth, World

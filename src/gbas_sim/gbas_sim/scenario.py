@@ -27,16 +27,17 @@ be left out::
         wedge: {kind: front, gradient: 300.0e-6, width_m: 50000.0, speed_mps: 100.0, direction_deg: 45.0}
         hangar: {kind: building, east_m: 90.0, north_m: 40.0, length_m: 60.0, width_m: 40.0, height_m: 15.0}
 
-A flight with ``segments`` or ``profile`` is one by the equations of motion, see :mod:`gbas_sim.flight_dynamics.keys`.
+A flight with ``segments`` or ``profile`` is one by the equations of motion, see :mod:`gbas_sim.flight.dynamics.keys`.
 Without a refractivity from either, there is no troposphere. A receiver with a ``preset`` is one of
-:mod:`gbas_sim.presets`; then its other keys are :data:`PRESET_KEYS`, among them those of its loops
-(``tracking: {spacing_chips: [0.1, 0.1, 1.0]}``, see :class:`~gbas_sim.tracking.TrackingParams`), its delays
-(``hardware``, :class:`~gbas_sim.oscillators.HardwareParams`) and its clock (``oscillator``, a name in
-:data:`~gbas_sim.oscillators.OSCILLATORS`). Fields and bounds of sections are those of
-:class:`~gbas_sim.world.WorldParams`, :class:`~gbas_sim.flight.StraightIn`, :class:`~gbas_sim.troposphere.Troposphere`,
-:class:`~gbas_sim.ionosphere.IonosphereParams`, :class:`~gbas_sim.scintillation.ScintillationParams`,
-:class:`~gbas_sim.site_scene.SceneParams` and :class:`~gbas_sim.receivers.ReceiverParams`; those of threats are of the
-classes in :data:`THREATS`, by their ``kind``. Angles are degrees in files only.
+:mod:`gbas_sim.receivers.presets`; then its other keys are :data:`PRESET_KEYS`, among them those of its loops
+(``tracking: {spacing_chips: [0.1, 0.1, 1.0]}``, see :class:`~gbas_core.signal.tracking_loops.TrackingParams`), its
+delays (``hardware``, :class:`~gbas_sim.receivers.oscillators.HardwareParams`) and its clock (``oscillator``, a name in
+:data:`~gbas_sim.receivers.oscillators.OSCILLATORS`). Fields and bounds of sections are those of
+:class:`~gbas_sim.world.WorldParams`, :class:`~gbas_sim.flight.straight_in.StraightIn`,
+:class:`~gbas_sim.atmosphere.troposphere.Troposphere`, :class:`~gbas_sim.atmosphere.ionosphere.IonosphereParams`,
+:class:`~gbas_sim.atmosphere.scintillation.ScintillationParams`, :class:`~gbas_sim.receivers.site_scene.SceneParams` and
+:class:`~gbas_sim.receivers.receiver.ReceiverParams`; those of threats are of the classes in :data:`THREATS`, by their
+``kind``. Angles are degrees in files only.
 """
 
 from __future__ import annotations
@@ -50,26 +51,26 @@ from typing import Any, Final
 
 import yaml
 
-from gbas_core.almanac import AlmanacError
-from gbas_core.approach import FinalApproach
-from gbas_core.approach_keys import approach_from_mapping
-from gbas_core.frames import ecef_from_geodetic
-from gbas_core.rinex import RinexError
-from gbas_sim.antenna import LinkBudget
-from gbas_sim.bounds import one_of
-from gbas_sim.faults import RECEIVER_FAULTS, SATELLITE_FAULTS
-from gbas_sim.flight import StraightIn
-from gbas_sim.flight_dynamics import flight_from_mapping
-from gbas_sim.fronts import PlasmaBubble, WedgeFront
-from gbas_sim.ionosphere import IonosphereParams
+from gbas_core.bounds import one_of
+from gbas_core.gnss.almanac import AlmanacError
+from gbas_core.gnss.frames import ecef_from_geodetic
+from gbas_core.io.rinex import RinexError
+from gbas_core.positioning.approach import FinalApproach
+from gbas_core.positioning.approach_keys import approach_from_mapping
+from gbas_core.signal.antenna import LinkBudget
+from gbas_sim.atmosphere.fronts import PlasmaBubble, WedgeFront
+from gbas_sim.atmosphere.ionosphere import IonosphereParams
+from gbas_sim.atmosphere.scintillation import ScintillationParams
+from gbas_sim.atmosphere.troposphere import Troposphere, WeatherBox
+from gbas_sim.faults.kinds import RECEIVER_FAULTS, SATELLITE_FAULTS
+from gbas_sim.flight.dynamics import flight_from_mapping
+from gbas_sim.flight.straight_in import StraightIn
 from gbas_sim.keys import keys_of, record_from_keys
-from gbas_sim.oscillators import OSCILLATORS
-from gbas_sim.presets import default_link, receiver_preset
-from gbas_sim.receiver_model import ReceiverModel
-from gbas_sim.receivers import AIRBORNE_RECEIVER, GROUND_RECEIVER, ReceiverParams
-from gbas_sim.scintillation import ScintillationParams
-from gbas_sim.site_scene import Building, SceneParams
-from gbas_sim.troposphere import Troposphere, WeatherBox
+from gbas_sim.receivers.oscillators import OSCILLATORS
+from gbas_sim.receivers.presets import default_link, receiver_preset
+from gbas_sim.receivers.receiver import AIRBORNE_RECEIVER, GROUND_RECEIVER, ReceiverParams
+from gbas_sim.receivers.receiver_model import ReceiverModel
+from gbas_sim.receivers.site_scene import Building, SceneParams
 from gbas_sim.world import FlightPath, World, WorldParams
 
 _WORLD_KEYS: Final[dict[str, type]] = {

@@ -16,17 +16,20 @@ from typing import Any, Final, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gbas_core.ephemeris import Ephemeris
-from gbas_core.gpstime import epoch_key, from_epoch_key
-from gbas_core.observations import ObservationEpoch
-from gbas_core.orbits import SatelliteState, group_delay_s
-from gbas_core.record import FloatArray
+from gbas_core.gnss.ephemeris import Ephemeris
+from gbas_core.gnss.gpstime import epoch_key, from_epoch_key
+from gbas_core.gnss.observations import ObservationEpoch
+from gbas_core.gnss.orbits import SatelliteState, group_delay_s
+from gbas_core.record import FloatArray, IntArray
 from gbas_core.satellites import N_SATS, SAT_INDEX, satellites_of
+from gbas_core.signal.antenna import airframe_loss_db
 from gbas_core.signals import L1, L2, L5, N_BANDS
-from gbas_sim.antenna import airframe_loss_db
-from gbas_sim.arcs import Breaks, IntArray, Passes, arc_numbers
-from gbas_sim.broadcast import Arc, Orbits, almanac_orbits, nominal_orbits, recorded_orbits
-from gbas_sim.faults import (
+from gbas_sim.atmosphere.fronts import PlasmaBubble, WedgeFront
+from gbas_sim.atmosphere.ionosphere import Ionosphere, IonosphereParams
+from gbas_sim.atmosphere.paths import Delay, SignalPaths, Station
+from gbas_sim.atmosphere.scintillation import Scintillation, ScintillationParams
+from gbas_sim.atmosphere.troposphere import Troposphere, WeatherBox
+from gbas_sim.faults.kinds import (
     RECEIVERS,
     FrozenOutput,
     Listener,
@@ -43,16 +46,13 @@ from gbas_sim.faults import (
     source_epochs,
     with_wrong_broadcasts,
 )
-from gbas_sim.fronts import PlasmaBubble, WedgeFront
-from gbas_sim.ionosphere import Ionosphere, IonosphereParams
-from gbas_sim.oscillators import ClockState
-from gbas_sim.paths import Delay, SignalPaths, Station
-from gbas_sim.receiver_model import ReceiverModel
-from gbas_sim.receivers import AIRBORNE_RECEIVER, GROUND_RECEIVER, Arrivals, ReceiverBank, ReceiverParams
-from gbas_sim.scintillation import Scintillation, ScintillationParams
-from gbas_sim.sightlines import sightlines, sky
-from gbas_sim.site_scene import Building, SceneParams, SiteScene
-from gbas_sim.troposphere import Troposphere, WeatherBox
+from gbas_sim.receivers.arcs import Breaks, Passes, arc_numbers
+from gbas_sim.receivers.oscillators import ClockState
+from gbas_sim.receivers.receiver import AIRBORNE_RECEIVER, GROUND_RECEIVER, Arrivals, ReceiverBank, ReceiverParams
+from gbas_sim.receivers.receiver_model import ReceiverModel
+from gbas_sim.receivers.site_scene import Building, SceneParams, SiteScene
+from gbas_sim.satellites.broadcast import Arc, Orbits, almanac_orbits, nominal_orbits, recorded_orbits
+from gbas_sim.satellites.sightlines import sightlines, sky
 
 MAX_RECEIVERS: Final = 4
 AIRCRAFT_NUMBER: Final = 100
@@ -66,7 +66,9 @@ _PASSES_S: Final = 300.0
 
 
 class FlightPath(Protocol):
-    """Where an aircraft is: :class:`gbas_sim.flight.StraightIn` or :class:`gbas_sim.flight_dynamics.Flight`."""
+    """Where an aircraft is: :class:`gbas_sim.flight.straight_in.StraightIn` or
+    :class:`gbas_sim.flight.dynamics.Flight`.
+    """
 
     @property
     def duration_s(self) -> float:
@@ -189,7 +191,7 @@ class WorldParams:
 
     @property
     def receiver_names(self) -> tuple[str, ...]:
-        """Names of the receivers, as in :data:`gbas_sim.faults.RECEIVERS`; the aircraft's last."""
+        """Names of the receivers, as in :data:`gbas_sim.faults.kinds.RECEIVERS`; the aircraft's last."""
         ground = RECEIVERS[: len(self.receiver_ecef_m)]
         return ground if self.flight is None else (*ground, RECEIVERS[-1])
 
@@ -251,7 +253,7 @@ class SimulatedEpoch:
     Attributes
     ----------
     key : int
-        Epoch key of the time tag, see :func:`gbas_core.gpstime.epoch_key`.
+        Epoch key of the time tag, see :func:`gbas_core.gnss.gpstime.epoch_key`.
     ground : tuple of ObservationEpoch
         One a reference receiver.
     airborne : ObservationEpoch or None

@@ -1,0 +1,1 @@
+"""Published results recomputed, and campaigns that go further."""

@@ -21,13 +21,11 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.stats import beta, norm
 
-from gbas_airborne.position import CLOCK_GROUPS
-from gbas_core.frames import geodetic_from_ecef, rot_enu_ecef
-from gbas_core.gpstime import epoch_key
-from gbas_core.record import FloatArray
+from gbas_core.gnss.frames import geodetic_from_ecef, rot_enu_ecef
+from gbas_core.gnss.gpstime import epoch_key
+from gbas_core.record import BoolArray, FloatArray
+from gbas_core.satellites import CLOCK_GROUPS
 from gbas_msgs_py.records import SolutionEpoch
-
-BoolArray = NDArray[np.bool_]
 
 ELEVATION_EDGES_DEG: Final = (0.0, 15.0, 25.0, 40.0, 60.0, 90.0)
 """Sigma is measured in these ranges of elevation."""

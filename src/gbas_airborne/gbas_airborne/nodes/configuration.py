@@ -6,8 +6,8 @@ from dataclasses import asdict, fields
 from typing import Any
 
 from gbas_airborne.params import AirborneParams
-from gbas_msgs_py.node import GbasNode
-from gbas_msgs_py.parameters import ParameterError
+from gbas_core.parameters import ParameterError
+from gbas_node.node import GbasNode
 
 PREFIX = "airborne."
 

@@ -8,12 +8,12 @@ from typing import Any
 
 from gbas_airborne.nodes.configuration import receiver_params
 from gbas_airborne.receiver import AirborneEpoch, AirborneReceiver, PositionState
-from gbas_core.gpstime import epoch_key, from_epoch_key
-from gbas_core.observations import ObservationEpoch
+from gbas_core.gnss.gpstime import epoch_key, from_epoch_key
+from gbas_core.gnss.observations import ObservationEpoch
 from gbas_msgs_py import tables, topics
 from gbas_msgs_py.joining import AirborneInput, AirborneJoiner
-from gbas_msgs_py.node import GbasNode, JoiningParams, run
-from gbas_msgs_py.vdb.burst import Burst
+from gbas_node.node import GbasNode, JoiningParams, run
+from gbas_vdb.transmission.burst import Burst
 
 
 class Positioning(GbasNode):

@@ -21,8 +21,7 @@ from typing import Final
 
 import numpy as np
 
-from gbas_core.record import FloatArray
-from gbas_ground.corrections import BoolArray
+from gbas_core.record import BoolArray, FloatArray
 from gbas_ground.ionosphere.position_errors import Geometries, geometries
 
 SIGMA_STEP_M: Final = 0.02

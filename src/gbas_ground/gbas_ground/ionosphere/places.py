@@ -10,10 +10,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from gbas_core.approach import FinalApproach, alert_limits
-from gbas_core.frames import rot_enu_ecef
-from gbas_core.record import FloatArray
-from gbas_ground.corrections import BoolArray
+from gbas_core.gnss.frames import rot_enu_ecef
+from gbas_core.positioning.approach import FinalApproach, alert_limits
+from gbas_core.record import BoolArray, FloatArray
 from gbas_ground.ionosphere.range_error import DivergenceCredit
 from gbas_ground.ionosphere.section import IonosphereSection
 from gbas_ground.params import GroundParams

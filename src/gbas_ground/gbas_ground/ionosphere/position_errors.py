@@ -3,7 +3,7 @@
 
 The clocks are eliminated from the normal equations and the three that are left are solved in closed form.
 
-Source: as :func:`gbas_core.wls.projection_matrix`, ICAO Annex 10 Vol. I, App. B 3.6.5.5.1.1.2.
+Source: as :func:`gbas_core.positioning.wls.projection_matrix`, ICAO Annex 10 Vol. I, App. B 3.6.5.5.1.1.2.
 """
 
 from __future__ import annotations
@@ -14,8 +14,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from gbas_core.compiled import compiled
-from gbas_core.record import FloatArray
-from gbas_ground.corrections import BoolArray
+from gbas_core.record import BoolArray, FloatArray
 
 _SINGULAR: Final = 1e-9
 """Of the product of the diagonal: a determinant below it is rounding, and the geometry has no position."""

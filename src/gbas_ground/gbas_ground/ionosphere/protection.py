@@ -17,17 +17,16 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gbas_core.error_models import AirborneAccuracy, sigma_air, sigma_iono_m, sigma_tropo_m
-from gbas_core.missed_detection import K_FFMD_SINGLE, k_ffmd
-from gbas_core.record import FloatArray
+from gbas_core.models.error_models import AirborneAccuracy, sigma_air, sigma_iono_m, sigma_tropo_m
+from gbas_core.models.missed_detection import K_FFMD_SINGLE, k_ffmd
+from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import N_SATS, SYSTEM_MASKS
-from gbas_ground.corrections import BoolArray
+from gbas_ground.corrections.sigma import MAX_SIGMA_M
 from gbas_ground.ionosphere.geometry_screening import Cases, judge, least_safe, sent_sigma_m, subsets_of
 from gbas_ground.ionosphere.places import Places, places_of
 from gbas_ground.ionosphere.range_error import worst_range_error_m
 from gbas_ground.ionosphere.threat import FrontThreat
 from gbas_ground.params import MAX_SIGMA_VIG, MIN_SERVICE_SATELLITES, GroundParams
-from gbas_ground.sigma import MAX_SIGMA_M
 
 _VIG_STEP: Final = 1.0e-7  # resolution of the type 2 message
 _VIG_STEPS: Final = round(MAX_SIGMA_VIG / _VIG_STEP)

@@ -19,7 +19,7 @@ The monitor of gradients is credited nothing: it sees slopes over the antennas o
 blind gradients; a front that ends short of the antennas, which are 450 m wide, is hardly less harmful (2.6 % at 2.6
 km).
 
-Sources: gbas_core.smoothing (filter); Pullen, Park, Enge, Radio Science 44 (2009) RS0A21 (``g (x + 2 tau v)``). The
+Sources: gbas_core.ranging.smoothing (filter); Pullen, Park, Enge, Radio Science 44 (2009) RS0A21 (``g (x + 2 tau v)``). The
 receding front and its credit are ours.
 """
 
@@ -79,7 +79,7 @@ def away_s(gradient: ArrayLike, speed_mps: ArrayLike, width_m: float, credit: Di
     credit : DivergenceCredit or None
         None credits nothing.
 
-    Source: response of two filters in a row to a rate that begins and ends, gbas_core.divergence.
+    Source: response of two filters in a row to a rate that begins and ends, gbas_core.ranging.divergence.
     """
     slope, speed = np.broadcast_arrays(np.asarray(gradient, dtype=np.float64), np.asarray(speed_mps, dtype=np.float64))
     if credit is None:

@@ -10,10 +10,10 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-from gbas_core.approach import FOOT_M, VAL_LOW_FT
+from gbas_core.parameters import ParameterError
+from gbas_core.positioning.approach import FOOT_M, VAL_LOW_FT
 from gbas_ground.declared import Declared, parameter
 from gbas_ground.ionosphere.threat import THREATS, FrontThreat
-from gbas_msgs_py.parameters import ParameterError
 
 _DEGREE: Final = math.pi / 180.0
 NO_THREAT: Final = "none"

@@ -3,7 +3,7 @@
 A monitor is a pure function of arrays on the satellite axis. It is told what to look at and its threshold, and returns
 a :class:`~gbas_ground.monitors.result.MonitorResult`: statistic, threshold and the mask of what failed. What a monitor
 has to remember between epochs is a frozen state it is given and gives back. What follows from a failure is not its
-business but the executive's (:mod:`gbas_ground.executive`).
+business but the executive's (:mod:`gbas_ground.exclusions`).
 
 ===================================  ==========================================================
 :mod:`~.expected_range`              raw pseudorange against the expected one

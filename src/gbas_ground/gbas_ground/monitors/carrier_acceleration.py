@@ -27,10 +27,9 @@ from typing import Final, Literal, NamedTuple
 import numpy as np
 from scipy.stats import binom
 
-from gbas_core.record import FloatArray
+from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import N_SATS
 from gbas_core.signals import L1, L5
-from gbas_ground.corrections import BoolArray
 from gbas_ground.monitors.carrier_noise import CarrierNoise
 from gbas_ground.monitors.expected_range import row_median
 from gbas_ground.monitors.false_alarm import EPOCH_S, EXPOSURE_S, FALSE_EXCLUSION, false_alarm_multiplier

@@ -1,8 +1,8 @@
 """Code-carrier divergence of single bands: the CCD monitor of GAST D.
 
-Each receiver's code minus carrier on each band goes through the filters of :mod:`gbas_core.divergence`; the filtered
-rates of the receivers used on a satellite are averaged, and the size of the mean is compared with the threshold. The
-ionosphere diverges code and carrier, too (twice its rate): what trips may be a front, not a fault.
+Each receiver's code minus carrier on each band goes through the filters of :mod:`gbas_core.ranging.divergence`; the
+filtered rates of the receivers used on a satellite are averaged, and the size of the mean is compared with the
+threshold. The ionosphere diverges code and carrier, too (twice its rate): what trips may be a front, not a fault.
 
 Source: Jiang, Milner, Macabiau, ENC 2015, eq (1) to (4) and 2.1.
 """
@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gbas_core.combinations import code_minus_carrier
-from gbas_core.divergence import (
+from gbas_core.ranging.combinations import code_minus_carrier
+from gbas_core.ranging.divergence import (
     GROUND,
     GROUND_SIGMA_MPS,
     GROUND_THRESHOLD_MPS,
@@ -24,9 +24,8 @@ from gbas_core.divergence import (
     initial_divergence,
     settled,
 )
-from gbas_core.record import FloatArray
+from gbas_core.record import BoolArray, FloatArray
 from gbas_core.signals import N_BANDS
-from gbas_ground.corrections import BoolArray
 from gbas_ground.monitors.result import MonitorResult, upper_limit
 
 

@@ -1,14 +1,14 @@
 """Carriers of a satellite that several receivers lose count of at one epoch: then it is the satellite that stepped.
 
 A step of more than a few centimetres restarts the filters of every receiver by itself
-(:mod:`gbas_core.slips`); this says why, and blames the satellite.
+(:mod:`gbas_core.ranging.slips`); this says why, and blames the satellite.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from gbas_ground.corrections import BoolArray
+from gbas_core.record import BoolArray
 from gbas_ground.monitors.result import MonitorResult, upper_limit
 
 _MOST_SHARE = 0.5

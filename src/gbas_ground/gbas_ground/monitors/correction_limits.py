@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gbas_core.record import FloatArray
-from gbas_ground.corrections import BoolArray
+from gbas_core.record import BoolArray, FloatArray
 from gbas_ground.monitors.result import MonitorResult, upper_limit
 
 

@@ -19,8 +19,8 @@ from typing import Final
 
 import numpy as np
 
-from gbas_core.combinations import combination_matrix
-from gbas_core.fault_modes import FAULT_MODES
+from gbas_core.ranging.combinations import combination_matrix
+from gbas_core.ranging.fault_modes import FAULT_MODES
 from gbas_core.record import FloatArray
 from gbas_ground.monitors.divergence_covariance import INDEPENDENT
 

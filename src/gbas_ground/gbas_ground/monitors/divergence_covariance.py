@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
-from gbas_core.combinations import combination_matrix
-from gbas_core.divergence import white_noise_gain
+from gbas_core.ranging.combinations import combination_matrix
+from gbas_core.ranging.divergence import white_noise_gain
 from gbas_core.record import FloatArray
 
 Matrix3 = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]

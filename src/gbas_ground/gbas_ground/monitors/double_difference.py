@@ -26,17 +26,14 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gbas_core.frames import geodetic_from_ecef, rot_enu_ecef
-from gbas_core.record import FloatArray
-from gbas_core.satellites import N_SATS
+from gbas_core.gnss.frames import geodetic_from_ecef, rot_enu_ecef
+from gbas_core.record import BoolArray, FloatArray, IntArray
+from gbas_core.satellites import CLOCK_GROUPS, N_SATS
 from gbas_core.signals import SPEED_OF_LIGHT_MPS, WAVELENGTH_M
-from gbas_ground.corrections import CLOCK_GROUPS, BoolArray
-from gbas_ground.gradient_detectability import Fuse, wrap_m
 from gbas_ground.monitors.carrier_noise import CarrierNoise
+from gbas_ground.monitors.gradient_detectability import Fuse, wrap_m
 
-IntArray = NDArray[np.int64]
 Pairing = Literal["star", "all"]
 
 NO_REFERENCE: Final = -1

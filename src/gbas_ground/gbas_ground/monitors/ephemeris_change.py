@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gbas_core.ephemeris import Ephemeris
-from gbas_core.orbits import satellite_state
+from gbas_core.gnss.ephemeris import Ephemeris
+from gbas_core.gnss.orbits import satellite_state
 from gbas_ground.monitors.result import MonitorResult, upper_limit
 
 

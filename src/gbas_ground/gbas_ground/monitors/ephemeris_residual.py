@@ -33,17 +33,18 @@ from typing import Final
 import numpy as np
 from scipy.stats import norm
 
-from gbas_core.record import FloatArray
+from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import N_SATS
 from gbas_core.signals import L1, L5, WAVELENGTH_M
-from gbas_ground.corrections import BoolArray
 from gbas_ground.monitors.carrier_noise import CarrierNoise
 from gbas_ground.monitors.double_difference import Baselines, DoubleDifferences, decided
 from gbas_ground.monitors.false_alarm import FALSE_EXCLUSION, false_alarm_multiplier
 from gbas_ground.monitors.result import MonitorResult, upper_limit
 
 REFERENCE_ELEVATION_RAD: Final = float(np.radians(30.0))
-"""Lowest reference satellite that a site's P is reckoned with. Ours; :mod:`gbas_ground.orbit_claim` has the epoch's."""
+"""Lowest reference satellite that a site's P is reckoned with. Ours; :mod:`gbas_ground.claims.orbit_claim` has the
+epoch's.
+"""
 _PARALLEL: Final = 1e-6  # sine of the angle below which two baselines, seen from the satellite, are one
 
 

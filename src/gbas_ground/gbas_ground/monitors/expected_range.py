@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gbas_core.record import FloatArray
-from gbas_ground.corrections import CLOCK_GROUPS, BoolArray
+from gbas_core.record import BoolArray, FloatArray
+from gbas_core.satellites import CLOCK_GROUPS
 from gbas_ground.monitors.result import MonitorResult, upper_limit
 
 

@@ -19,7 +19,7 @@ from scipy.stats import chi2
 
 from gbas_core.record import FloatArray
 from gbas_core.signals import IONO_RATIO, WAVELENGTH_M
-from gbas_ground.gradient_detectability import GRADIENT_RANGE, wrap_m
+from gbas_ground.monitors.gradient_detectability import GRADIENT_RANGE, wrap_m
 
 LEAST_ANGLE_RAD: Final = float(np.radians(5.0))
 """Directions of baselines that differ by less tell no direction of a gradient. Ours."""

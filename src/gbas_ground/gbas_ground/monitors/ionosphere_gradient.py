@@ -3,8 +3,8 @@
 The statistic of a baseline is the double difference to the nearest wavelength
 (:mod:`~gbas_ground.monitors.double_difference`). A gradient shows as its delay over the baseline, less whole
 wavelengths: the monitor needs no history and no ambiguity, and it is blind to gradients that make nearly whole
-wavelengths (:mod:`gbas_ground.gradient_detectability`). Every baseline has blind gradients of its own; together they
-leave few.
+wavelengths (:mod:`gbas_ground.monitors.gradient_detectability`). Every baseline has blind gradients of its own;
+together they leave few.
 
 What it does not see: a gradient that all satellites share, which is part of the receivers' clocks here and in the air;
 a gradient across all baselines; and, at low elevations, whatever a threshold of half a wavelength would have to pass.
@@ -33,10 +33,12 @@ from typing import Final
 import numpy as np
 from scipy.stats import norm
 
-from gbas_core.record import FloatArray
+from gbas_core.record import BoolArray, FloatArray, IntArray
 from gbas_core.signals import L1, L5, WAVELENGTH_M
-from gbas_ground.corrections import BoolArray
-from gbas_ground.gradient_detectability import (
+from gbas_ground.monitors.carrier_noise import CarrierNoise
+from gbas_ground.monitors.double_difference import Baselines, DoubleDifferences, Pairing, baselines_of, decided
+from gbas_ground.monitors.false_alarm import FALSE_EXCLUSION, false_alarm_multiplier
+from gbas_ground.monitors.gradient_detectability import (
     GRADIENT_RANGE,
     P_MISSED_DETECTION,
     BaselineMonitor,
@@ -45,16 +47,6 @@ from gbas_ground.gradient_detectability import (
     check_gradient_range,
     projected_length_m,
 )
-from gbas_ground.monitors.carrier_noise import CarrierNoise
-from gbas_ground.monitors.double_difference import (
-    Baselines,
-    DoubleDifferences,
-    IntArray,
-    Pairing,
-    baselines_of,
-    decided,
-)
-from gbas_ground.monitors.false_alarm import FALSE_EXCLUSION, false_alarm_multiplier
 from gbas_ground.monitors.gradient_estimates import gradient_set
 from gbas_ground.monitors.result import MonitorResult, upper_limit
 

@@ -6,8 +6,8 @@ from typing import Final
 
 import numpy as np
 
-from gbas_core.record import FloatArray
-from gbas_ground.corrections import BoolArray, clock_removed_sigma_m
+from gbas_core.record import BoolArray, FloatArray
+from gbas_ground.corrections.formation import clock_removed_sigma_m
 from gbas_ground.monitors.result import MonitorResult, upper_limit
 
 MAX_B_VALUE_M: Final = 6.35

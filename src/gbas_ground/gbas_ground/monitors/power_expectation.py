@@ -20,10 +20,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gbas_core.record import FloatArray
+from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import N_SATS
 from gbas_core.signals import L1, L5, N_BANDS
-from gbas_ground.corrections import BoolArray
 from gbas_ground.monitors.false_alarm import EPOCH_S, FALSE_EXCLUSION, false_alarm_multiplier
 from gbas_ground.monitors.result import MonitorResult, upper_limit
 

@@ -5,11 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gbas_core.record import FloatArray
-
-BoolArray = NDArray[np.bool_]
+from gbas_core.record import BoolArray, FloatArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

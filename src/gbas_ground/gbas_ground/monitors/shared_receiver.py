@@ -34,11 +34,10 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from gbas_core.record import FloatArray
+from gbas_core.record import BoolArray, FloatArray
 from gbas_core.signals import IONO_RATIO, WAVELENGTH_M
-from gbas_ground.corrections import BoolArray
-from gbas_ground.gradient_detectability import wrap_m
 from gbas_ground.monitors.double_difference import Baselines, DoubleDifferences
+from gbas_ground.monitors.gradient_detectability import wrap_m
 from gbas_ground.monitors.result import MonitorResult
 
 # Uncertain, ours.

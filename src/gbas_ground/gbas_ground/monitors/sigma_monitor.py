@@ -32,9 +32,8 @@ from scipy.optimize import brentq
 from scipy.special import ndtr
 from scipy.stats import chi2, norm
 
-from gbas_core.record import FloatArray
+from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import N_SATS
-from gbas_ground.corrections import BoolArray
 from gbas_ground.monitors.false_alarm import EXPOSURE_S, FALSE_EXCLUSION
 from gbas_ground.monitors.result import MonitorResult, upper_limit
 

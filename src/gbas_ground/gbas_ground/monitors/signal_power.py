@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from gbas_core.record import FloatArray
-from gbas_ground.corrections import BoolArray
+from gbas_core.record import BoolArray, FloatArray
 from gbas_ground.monitors.result import MonitorResult, upper_limit
 
 

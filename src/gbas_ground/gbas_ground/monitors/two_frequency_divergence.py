@@ -35,8 +35,8 @@ from typing import Final, Literal
 import numpy as np
 from scipy.special import chdtri
 
-from gbas_core.combinations import divergence_free_cmc, iono_free_weights, ionosphere_free
-from gbas_core.divergence import (
+from gbas_core.ranging.combinations import divergence_free_cmc, iono_free_weights, ionosphere_free
+from gbas_core.ranging.divergence import (
     GROUND,
     DivergenceParams,
     DivergenceState,
@@ -45,10 +45,9 @@ from gbas_core.divergence import (
     rate_step,
     settled,
 )
-from gbas_core.record import FloatArray
-from gbas_core.satellites import N_SATS
+from gbas_core.record import BoolArray, FloatArray
+from gbas_core.satellites import CLOCK_GROUPS, N_SATS
 from gbas_core.signals import BANDS, L1, L5, N_BANDS, SPEED_OF_LIGHT_MPS
-from gbas_ground.corrections import CLOCK_GROUPS, BoolArray
 from gbas_ground.monitors.code_carrier_divergence import receiver_mean
 from gbas_ground.monitors.divergence_covariance import PRINTED_COVARIANCE, StatisticCovariance
 from gbas_ground.monitors.expected_range import row_median

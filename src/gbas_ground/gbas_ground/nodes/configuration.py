@@ -7,9 +7,9 @@ from typing import Any, Final
 
 import yaml
 
+from gbas_core.parameters import ParameterError
 from gbas_ground.params import GroundParams, ground_section
-from gbas_msgs_py.node import GbasNode
-from gbas_msgs_py.parameters import ParameterError
+from gbas_node.node import GbasNode
 
 PREFIX: Final = "ground."
 _RECEIVERS: Final = "receivers.rr1_ecef_m"

@@ -9,9 +9,9 @@ from gbas_ground.broadcast import BroadcastState
 from gbas_ground.nodes.configuration import station_params
 from gbas_ground.station import GroundStation
 from gbas_msgs_py import tables, topics
-from gbas_msgs_py.node import ConfiguredParams, GbasNode, run
 from gbas_msgs_py.records import IntegrityEpoch
 from gbas_msgs_py.ros import empty_frame
+from gbas_node.node import ConfiguredParams, GbasNode, run
 
 
 class CorrectionBroadcast(GbasNode):

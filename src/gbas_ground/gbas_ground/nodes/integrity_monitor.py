@@ -6,13 +6,13 @@ from collections.abc import Iterable
 from functools import partial
 from typing import Any
 
-from gbas_core.gpstime import epoch_key, from_epoch_key
-from gbas_core.observations import ObservationEpoch
+from gbas_core.gnss.gpstime import epoch_key, from_epoch_key
+from gbas_core.gnss.observations import ObservationEpoch
 from gbas_ground.nodes.configuration import station_params
 from gbas_ground.station import GroundEpoch, GroundStation, initial_monitor_state
 from gbas_msgs_py import tables, topics
 from gbas_msgs_py.joining import EpochJoiner, JoinedEpoch
-from gbas_msgs_py.node import GbasNode, JoiningParams, run
+from gbas_node.node import GbasNode, JoiningParams, run
 
 
 class IntegrityMonitor(GbasNode):

@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from gbas_core.gpstime import from_epoch_key
-from gbas_core.observations import ObservationEpoch
-from gbas_core.recording import RecordedEpoch, Recording
+from gbas_core.gnss.gpstime import from_epoch_key
+from gbas_core.gnss.observations import ObservationEpoch
+from gbas_core.io.recording import RecordedEpoch, Recording
 from gbas_core.satellites import SYSTEM_MASKS, satellites_of
 from gbas_msgs_py import tables, topics
-from gbas_msgs_py.driver import DriverNode, DriverParams, EphemerisFeed
-from gbas_msgs_py.node import require, run
 from gbas_msgs_py.records import MAX_REFERENCE_RECEIVERS
+from gbas_node.driver import DriverNode, DriverParams, EphemerisFeed
+from gbas_node.node import require, run
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,7 +66,7 @@ class ReceiverReplayParams(DriverParams):
 
 
 class ReceiverReplay(DriverNode[RecordedEpoch]):
-    """Sends a :class:`gbas_core.recording.Recording`, epoch by epoch; a receiver without data sends a marker row."""
+    """Sends a :class:`gbas_core.io.recording.Recording`, epoch by epoch; a receiver without data sends a marker row."""
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("receiver_replay", ReceiverReplayParams, **kwargs)

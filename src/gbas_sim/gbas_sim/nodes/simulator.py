@@ -6,13 +6,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from gbas_core.ephemeris import Ephemeris
-from gbas_core.gpstime import epoch_key
+from gbas_core.gnss.ephemeris import Ephemeris
+from gbas_core.gnss.gpstime import epoch_key
 from gbas_msgs_py import tables, topics
-from gbas_msgs_py.driver import DriverNode, DriverParams
 from gbas_msgs_py.joining import ReceptionQueue
-from gbas_msgs_py.node import run
 from gbas_msgs_py.tables import TruthEpoch
+from gbas_node.driver import DriverNode, DriverParams
+from gbas_node.node import run
 from gbas_sim.scenario import open_world, read_sections, scenario_from_mapping, scenario_values
 from gbas_sim.world import SimulatedEpoch, Truth, World
 

@@ -18,20 +18,14 @@ from typing import Final
 
 import numpy as np
 
-from gbas_core.frames import azimuth_elevation, rot_enu_ecef
-from gbas_core.orbits import rotated_range
-from gbas_core.record import FloatArray
+from gbas_core.gnss.frames import azimuth_elevation, rot_enu_ecef
+from gbas_core.gnss.orbits import rotated_range
+from gbas_core.record import BoolArray, FloatArray, IntArray
 from gbas_core.satellites import N_SATS
 from gbas_core.signals import IONO_RATIO, WAVELENGTH_M
-from gbas_ground.corrections import BoolArray
-from gbas_ground.gradient_detectability import P_FALSE_ALARM
-from gbas_ground.monitors.double_difference import (
-    DoubleDifferences,
-    IntArray,
-    double_differences,
-    reference_satellites,
-)
+from gbas_ground.monitors.double_difference import DoubleDifferences, double_differences, reference_satellites
 from gbas_ground.monitors.false_alarm import false_alarm_multiplier
+from gbas_ground.monitors.gradient_detectability import P_FALSE_ALARM
 from gbas_ground.monitors.ionosphere_gradient import (
     BandTests,
     GradientSite,

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from gbas_core.record import FloatArray
 from gbas_core.signals import L1, WAVELENGTH_M
-from gbas_ground.gradient_detectability import (
+from gbas_ground.monitors.gradient_detectability import (
     GRADIENT_RANGE,
     BaselineMonitor,
     Fuse,
@@ -22,7 +22,7 @@ from gbas_ground.gradient_detectability import (
     k_factor,
     statistic_m,
 )
-from gbas_ground.siting.worst_gradient import worst_gradient
+from gbas_siting.worst_gradient import worst_gradient
 from gbas_studies.asigm.testbed import Testbed
 from gbas_studies.reproduction.drawing import LIMIT_COLOUR, new_figure
 from gbas_studies.reproduction.items import Claim, Picture, Section, Value

@@ -8,10 +8,10 @@ import numpy as np
 
 from gbas_core.record import FloatArray
 from gbas_core.signals import L1, L5
-from gbas_ground.gradient_detectability import GRADIENT_RANGE
-from gbas_ground.siting.chain import chain_statistic_m
-from gbas_ground.siting.problem import SitingProblem
-from gbas_ground.siting.search import BUDGET, Siting, best_siting
+from gbas_ground.monitors.gradient_detectability import GRADIENT_RANGE
+from gbas_siting.chain import chain_statistic_m
+from gbas_siting.problem import SitingProblem
+from gbas_siting.search import BUDGET, Siting, best_siting
 from gbas_studies.asigm.detectability import WAVELENGTH, K
 from gbas_studies.reproduction.drawing import new_figure
 from gbas_studies.reproduction.items import Claim, Picture, Section, Value

@@ -18,8 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
+from gbas_core.parameters import require
 from gbas_core.record import FloatArray
-from gbas_ground.gradient_detectability import (
+from gbas_ground.monitors.gradient_detectability import (
     GRADIENT_RANGE,
     P_FALSE_ALARM,
     P_MISSED_DETECTION,
@@ -27,9 +28,8 @@ from gbas_ground.gradient_detectability import (
     coverage_percent,
     wrap_m,
 )
-from gbas_ground.siting.problem import SitingProblem
-from gbas_ground.siting.search import best_siting
-from gbas_msgs_py.parameters import require
+from gbas_siting.problem import SitingProblem
+from gbas_siting.search import best_siting
 from gbas_studies.asigm.detectability import WAVELENGTH, K
 from gbas_studies.asigm.testbed import Testbed
 from gbas_studies.reproduction.drawing import LIMIT_COLOUR, new_figure

@@ -9,10 +9,10 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from gbas_core.record import FloatArray
-from gbas_ground.gradient_detectability import GRADIENT_RANGE
-from gbas_ground.siting.problem import SitingProblem
-from gbas_ground.siting.search import Siting, best_siting
-from gbas_ground.siting.worst_gradient import worst_gradient
+from gbas_ground.monitors.gradient_detectability import GRADIENT_RANGE
+from gbas_siting.problem import SitingProblem
+from gbas_siting.search import Siting, best_siting
+from gbas_siting.worst_gradient import worst_gradient
 from gbas_studies.asigm.detectability import WAVELENGTH, K, largest_sigma_m, optimum_picture
 from gbas_studies.asigm.testbed import Testbed
 from gbas_studies.reproduction.drawing import new_figure

@@ -14,9 +14,9 @@ import numpy as np
 
 from gbas_core.record import FloatArray
 from gbas_core.signals import IONO_RATIO, L1, L5
-from gbas_ground.gradient_detectability import GRADIENT_RANGE, BaselineMonitor, coverage_percent
 from gbas_ground.monitors.carrier_noise import CarrierNoise
 from gbas_ground.monitors.double_difference import Baselines, baselines_of
+from gbas_ground.monitors.gradient_detectability import GRADIENT_RANGE, BaselineMonitor, coverage_percent
 from gbas_ground.monitors.gradient_estimates import GradientVectors, gradient_vectors
 from gbas_studies.asigm.detectability import K
 from gbas_studies.asigm.testbed import FOURTH_ECEF_M, RECEIVERS_ECEF_M, Testbed

@@ -13,14 +13,14 @@ from typing import Final
 
 import numpy as np
 
-from gbas_core.ephemeris import Ephemeris
-from gbas_core.gpstime import epoch_key, from_epoch_key
-from gbas_core.record import FloatArray
+from gbas_core.gnss.ephemeris import Ephemeris
+from gbas_core.gnss.gpstime import epoch_key, from_epoch_key
+from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import satellites_of
 from gbas_core.signals import BANDS, L1
-from gbas_ground import ephemerides
-from gbas_ground.corrections import BoolArray
-from gbas_ground.geometry import expected, site_of
+from gbas_ground.channels import ephemerides
+from gbas_ground.channels.predicted_ranges import expected, site_of
+from gbas_ground.channels.tracking import stack
 from gbas_ground.monitors.double_difference import (
     Troposphere,
     carrier_residual_m,
@@ -32,7 +32,6 @@ from gbas_ground.monitors.ionosphere_gradient import (
     check_ionosphere_gradient,
     gradient_site,
 )
-from gbas_ground.tracking import stack
 from gbas_msgs_py.joining import ReceptionQueue
 from gbas_studies.ccd.recorded import MASK_RAD, PAIR_L1L2, PAIR_L1L5, RecordedSet, station_params
 from gbas_studies.reproduction.drawing import new_figure

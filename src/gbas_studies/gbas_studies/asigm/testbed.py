@@ -8,9 +8,9 @@ from typing import Final
 
 import numpy as np
 
-from gbas_core.frames import geodetic_from_ecef, rot_enu_ecef
+from gbas_core.gnss.frames import geodetic_from_ecef, rot_enu_ecef
 from gbas_core.record import FloatArray
-from gbas_ground.gradient_detectability import projected_length_m
+from gbas_ground.monitors.gradient_detectability import projected_length_m
 from gbas_studies.reproduction.items import Section, Value
 
 RECEIVERS_ECEF_M: Final = np.array(

@@ -17,13 +17,13 @@ from typing import Final
 import numpy as np
 from scipy.stats import hypergeom
 
-from gbas_core.combinations import ionosphere_free_sigma
-from gbas_core.error_models import sigma_air, sigma_pr_gnd
-from gbas_core.frames import azimuth_elevation, ecef_from_geodetic, los_and_range, rot_enu_ecef
+from gbas_core.gnss.frames import azimuth_elevation, ecef_from_geodetic, los_and_range, rot_enu_ecef
+from gbas_core.models.error_models import sigma_air, sigma_pr_gnd
+from gbas_core.ranging.combinations import ionosphere_free_sigma
 from gbas_core.record import FloatArray
 from gbas_core.signals import L1, L5
 from gbas_ground.monitors.two_frequency_divergence import TwoFrequencyParams
-from gbas_sim.constellation import nominal_slots
+from gbas_sim.satellites.constellation import nominal_slots
 from gbas_studies.reproduction.drawing import LIMIT_COLOUR, new_figure
 from gbas_studies.reproduction.items import Claim, Item, Picture, Section, Value
 

@@ -9,8 +9,8 @@ from typing import Any, Final
 import numpy as np
 from scipy.optimize import brentq
 
-from gbas_core.divergence import GROUND, GROUND_SIGMA_MPS, GROUND_THRESHOLD_MPS, white_noise_gain
-from gbas_core.fault_modes import FAULT_MODES, fault_direction
+from gbas_core.ranging.divergence import GROUND, GROUND_SIGMA_MPS, GROUND_THRESHOLD_MPS, white_noise_gain
+from gbas_core.ranging.fault_modes import FAULT_MODES, fault_direction
 from gbas_core.record import FloatArray
 from gbas_core.satellites import SAT_IDS
 from gbas_core.signals import L5

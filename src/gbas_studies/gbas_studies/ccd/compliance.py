@@ -21,9 +21,9 @@ from typing import Final, get_args
 
 import numpy as np
 
-from gbas_core.combinations import combination_matrix, iono_free_weights
-from gbas_core.divergence import ramp_response
-from gbas_core.fault_modes import FAULT_MODES
+from gbas_core.ranging.combinations import combination_matrix, iono_free_weights
+from gbas_core.ranging.divergence import ramp_response
+from gbas_core.ranging.fault_modes import FAULT_MODES
 from gbas_core.record import FloatArray
 from gbas_core.signals import L1, L5
 from gbas_ground.monitors.divergence_covariance import INDEPENDENT, PRINTED_COVARIANCE

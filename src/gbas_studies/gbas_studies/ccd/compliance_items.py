@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from gbas_core.fault_modes import FAULT_MODES
+from gbas_core.ranging.fault_modes import FAULT_MODES
 from gbas_core.record import FloatArray
 from gbas_studies.ccd.compliance import (
     MALFUNCTION_M,

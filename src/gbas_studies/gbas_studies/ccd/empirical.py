@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from gbas_core.divergence import GROUND, GROUND_THRESHOLD_MPS, DivergenceParams
+from gbas_core.ranging.divergence import GROUND, GROUND_THRESHOLD_MPS, DivergenceParams
 from gbas_core.record import FloatArray
 from gbas_core.satellites import SAT_IDS
 from gbas_core.signals import BANDS, L1

@@ -8,8 +8,8 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.axes import Axes
 
-from gbas_core.divergence import GROUND_SIGMA_MPS
-from gbas_core.fault_modes import FAULT_MODES
+from gbas_core.ranging.divergence import GROUND_SIGMA_MPS
+from gbas_core.ranging.fault_modes import FAULT_MODES
 from gbas_core.record import FloatArray
 from gbas_ground.monitors.two_frequency_divergence import threshold
 from gbas_studies.ccd.missed_detection import critical_mapping_gast_d, critical_mapping_gast_f, p_md, required_p_md

@@ -13,11 +13,11 @@ from typing import Final
 
 import numpy as np
 
-from gbas_core.combinations import combination_matrix
-from gbas_core.divergence import GROUND, DivergenceState, ramp_response
-from gbas_core.fault_modes import fault_direction
+from gbas_core.io.recording import RecordedEpoch
+from gbas_core.ranging.combinations import combination_matrix
+from gbas_core.ranging.divergence import GROUND, DivergenceState, ramp_response
+from gbas_core.ranging.fault_modes import fault_direction
 from gbas_core.record import FloatArray
-from gbas_core.recording import RecordedEpoch
 from gbas_core.satellites import N_SATS, SAT_IDS
 from gbas_core.signals import L1, L5
 from gbas_ground.monitors.code_carrier_divergence import CcdParams, ccd_step, initial_ccd
@@ -33,12 +33,12 @@ from gbas_ground.monitors.two_frequency_divergence import (
     threshold,
     two_frequency_step,
 )
-from gbas_sim.fault_base import Moment, SignalEffect
-from gbas_sim.fronts import WedgeFront
-from gbas_sim.ionosphere import IonosphereParams
-from gbas_sim.presets import receiver_preset
-from gbas_sim.signal_faults import CodeCarrierDivergence
-from gbas_sim.troposphere import Troposphere
+from gbas_sim.atmosphere.fronts import WedgeFront
+from gbas_sim.atmosphere.ionosphere import IonosphereParams
+from gbas_sim.atmosphere.troposphere import Troposphere
+from gbas_sim.faults.fault_base import Moment, SignalEffect
+from gbas_sim.faults.signal_faults import CodeCarrierDivergence
+from gbas_sim.receivers.presets import receiver_preset
 from gbas_sim.world import World, WorldParams
 from gbas_studies.ccd.monitors import TAU_S
 from gbas_studies.ccd.recorded import MonitoredSeries, Observer, monitor_epochs

@@ -11,9 +11,9 @@ from typing import Final, Literal, cast, get_args
 import numpy as np
 from scipy.special import ndtri
 
-from gbas_core.combinations import combination_matrix
-from gbas_core.divergence import GROUND, GROUND_SIGMA_MPS, GROUND_THRESHOLD_MPS
-from gbas_core.fault_modes import FAULT_MODES, fault_direction
+from gbas_core.ranging.combinations import combination_matrix
+from gbas_core.ranging.divergence import GROUND, GROUND_SIGMA_MPS, GROUND_THRESHOLD_MPS
+from gbas_core.ranging.fault_modes import FAULT_MODES, fault_direction
 from gbas_core.record import FloatArray
 from gbas_core.signals import L1, L5
 from gbas_ground.monitors.divergence_covariance import INDEPENDENT, PRINTED_COVARIANCE, published_by_origin
@@ -66,7 +66,7 @@ def monitor_for(
     ----------
     name : {"gast-d", "gast-f-paper", "gast-f-sound"}
     mode : str
-        One of :data:`gbas_core.fault_modes.FAULT_MODES`.
+        One of :data:`gbas_core.ranging.fault_modes.FAULT_MODES`.
     error_on : {"L1", "L5", "IF"}, optional
         What the error is of; the GAST D monitor watches that band (both for IF, and the more sensitive one counts).
     rounded : bool

@@ -1,7 +1,7 @@
 """False alarms and missed detections down to 1e-9 by importance sampling, through the filters themselves.
 
-White noise of code and carrier goes epoch by epoch through :func:`gbas_core.divergence.divergence_step` until the
-filters have settled. To make the rare event common the noise is given a mean, proportional to the filters' impulse
+White noise of code and carrier goes epoch by epoch through :func:`gbas_core.ranging.divergence.divergence_step` until
+the filters have settled. To make the rare event common the noise is given a mean, proportional to the filters' impulse
 response, so that the statistic arrives near its threshold; each sample counts with the ratio of its densities without
 and with that mean, which depends on the statistic alone. For an alarm on any side the mean points anywhere at random.
 
@@ -19,9 +19,9 @@ from typing import Final
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from gbas_core.combinations import combination_matrix
-from gbas_core.divergence import DivergenceParams, divergence_step, initial_divergence, white_noise_gain
-from gbas_core.fault_modes import fault_direction
+from gbas_core.ranging.combinations import combination_matrix
+from gbas_core.ranging.divergence import DivergenceParams, divergence_step, initial_divergence, white_noise_gain
+from gbas_core.ranging.fault_modes import fault_direction
 from gbas_core.record import FloatArray
 from gbas_core.signals import L1, L5
 from gbas_ground.monitors.divergence_covariance import INDEPENDENT

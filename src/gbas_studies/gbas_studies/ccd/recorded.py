@@ -10,18 +10,18 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from gbas_core.divergence import DivergenceParams
-from gbas_core.ephemeris import Ephemeris
-from gbas_core.frames import geodetic_from_ecef
-from gbas_core.gpstime import epoch_key, from_epoch_key
-from gbas_core.record import FloatArray
-from gbas_core.recording import RecordedEpoch, Recording
+from gbas_core.gnss.ephemeris import Ephemeris
+from gbas_core.gnss.frames import geodetic_from_ecef
+from gbas_core.gnss.gpstime import epoch_key, from_epoch_key
+from gbas_core.io.recording import RecordedEpoch, Recording
+from gbas_core.ranging.divergence import DivergenceParams
+from gbas_core.ranging.slips import SlipParams, initial_slips, slip_step
+from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import N_SATS, satellites_of
 from gbas_core.signals import BANDS, L1, L2, L5, N_BANDS, SPEED_OF_LIGHT_MPS
-from gbas_core.slips import SlipParams, initial_slips, slip_step
-from gbas_ground import ephemerides as station_ephemerides
-from gbas_ground.corrections import BoolArray
-from gbas_ground.geometry import expected, site_of
+from gbas_ground.channels import ephemerides as station_ephemerides
+from gbas_ground.channels.predicted_ranges import expected, site_of
+from gbas_ground.channels.tracking import stack
 from gbas_ground.monitors.code_carrier_divergence import CcdParams, ccd_step, initial_ccd
 from gbas_ground.monitors.divergence_covariance import Calibration, StatisticCovariance, calibrate
 from gbas_ground.monitors.two_frequency_divergence import (
@@ -32,7 +32,6 @@ from gbas_ground.monitors.two_frequency_divergence import (
     two_frequency_step,
 )
 from gbas_ground.params import GroundParams
-from gbas_ground.tracking import stack
 from gbas_msgs_py.joining import ReceptionQueue
 
 ALL: Final = slice(None)
@@ -129,7 +128,7 @@ STORM_SETS: Final = (
     _storm("garl", "305", "GARL, 1 November 2003"),
 )
 # 30 s data let nothing be filtered with tau = 30 s. Ten epochs a time constant are the least that averages anything;
-# the settle time is the 6.9 tau of gbas_core.divergence, and one missing epoch is bridged.
+# the settle time is the 6.9 tau of gbas_core.ranging.divergence, and one missing epoch is bridged.
 STORM_FILTERS: Final = DivergenceParams(tau_s=300.0, max_gap_s=65.0, settle_s=2070.0)
 # As long as the sets of a few minutes allow: 6.9 tau instead of the paper's 360 s.
 SHORT_SETTLE: Final = DivergenceParams(tau_s=30.0, settle_s=207.0)

@@ -20,8 +20,8 @@ from typing import Final, Literal, cast, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gbas_core.ranging.smoothing import SmoothingParams, initial_smoothing, smooth_step
 from gbas_core.record import FloatArray
-from gbas_core.smoothing import SmoothingParams, initial_smoothing, smooth_step
 
 Start = Literal["variant", "invariant"]
 LONG_BEFORE: Final = -(10**6)

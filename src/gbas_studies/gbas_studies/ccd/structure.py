@@ -7,8 +7,8 @@ from typing import Final
 
 import numpy as np
 
-from gbas_core.combinations import combination_matrix, iono_ratio
-from gbas_core.divergence import (
+from gbas_core.ranging.combinations import combination_matrix, iono_ratio
+from gbas_core.ranging.divergence import (
     GROUND,
     divergence_step,
     initial_divergence,

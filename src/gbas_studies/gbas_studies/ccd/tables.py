@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from scipy.special import ndtr
 
-from gbas_core.divergence import (
+from gbas_core.ranging.divergence import (
     AIRBORNE_SIGMA_MPS,
     AIRBORNE_THRESHOLD_MPS,
     GROUND_SIGMA_MPS,

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gbas_core.divergence import ramp_response
+from gbas_core.ranging.divergence import ramp_response
 from gbas_core.record import FloatArray
 from gbas_studies.ccd.monitors import TAU_S, ErrorOn, Monitor, cmc_rate, error_band, monitor_for
 from gbas_studies.ccd.smoothed_error import Smoothing, StudyError, evaluation_sample, unit_error_s

@@ -19,7 +19,8 @@ from typing import Any, Final
 import numpy as np
 
 from gbas_ground.params import GroundParams
-from gbas_sim.faults import (
+from gbas_sim.atmosphere.fronts import WedgeFront
+from gbas_sim.faults.kinds import (
     FAULT_MODES,
     CodeCarrierDivergence,
     ExcessiveAcceleration,
@@ -29,7 +30,6 @@ from gbas_sim.faults import (
     OrbitFault,
     RangeFault,
 )
-from gbas_sim.fronts import WedgeFront
 from gbas_sim.world import WorldParams
 from gbas_studies.ccd.monitors import cmc_rate
 from gbas_studies.ccd.smoothed_error import Smoothing, StudyError

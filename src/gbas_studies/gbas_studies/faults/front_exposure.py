@@ -22,7 +22,7 @@ from typing import Final
 
 import numpy as np
 
-from gbas_core.divergence import AIRBORNE, AIRBORNE_THRESHOLD_MPS, ramp_response
+from gbas_core.ranging.divergence import AIRBORNE, AIRBORNE_THRESHOLD_MPS, ramp_response
 from gbas_core.record import FloatArray
 from gbas_studies.ccd.smoothed_error import LONG_BEFORE, Smoothing, StudyError, smoothed_cmc_s
 

@@ -12,20 +12,20 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from gbas_core.ephemeris import Ephemeris
-from gbas_core.gpstime import epoch_key, from_epoch_key
+from gbas_core.gnss.ephemeris import Ephemeris
+from gbas_core.gnss.gpstime import epoch_key, from_epoch_key
 from gbas_core.satellites import RANGING_SOURCE_ID, SAT_INDEX
 from gbas_ground.params import GroundParams
 from gbas_ground.station import GroundEpoch, GroundStation, Monitored, StationState, initial_state
 from gbas_msgs_py.events import Event, EventKind
 from gbas_msgs_py.joining import ReceptionQueue
 from gbas_msgs_py.records import GROUND_MONITORS, MonitorState
-from gbas_msgs_py.vdb.burst import SLOT_DURATION_S, Burst
-from gbas_msgs_py.vdb.messages import Type1, Type11
-from gbas_msgs_py.vdb.receive import decode_burst
-from gbas_sim.faults import ReceiverFault, SatelliteFault
-from gbas_sim.fronts import PlasmaBubble, WedgeFront
+from gbas_sim.atmosphere.fronts import PlasmaBubble, WedgeFront
+from gbas_sim.faults.kinds import ReceiverFault, SatelliteFault
 from gbas_sim.world import World, WorldParams
+from gbas_vdb.messages.types import Type1, Type11
+from gbas_vdb.transmission.burst import SLOT_DURATION_S, Burst
+from gbas_vdb.transmission.receive import decode_burst
 
 Threat = SatelliteFault | ReceiverFault | WedgeFront | PlasmaBubble
 

@@ -9,20 +9,19 @@ from typing import Final
 import numpy as np
 
 from gbas_airborne.params import AirborneParams
-from gbas_core.approach import FinalApproach
-from gbas_core.gpstime import epoch_key
-from gbas_core.observations import ObservationEpoch
-from gbas_core.record import FloatArray
-from gbas_core.recording import RecordedEpoch
+from gbas_chain.chain import AirborneOutput, Chain, GroundOutput
+from gbas_core.gnss.gpstime import epoch_key
+from gbas_core.gnss.observations import ObservationEpoch
+from gbas_core.io.recording import RecordedEpoch
+from gbas_core.positioning.approach import FinalApproach
+from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import N_SATS
 from gbas_core.signals import IONO_RATIO
-from gbas_ground.corrections import BoolArray
 from gbas_ground.params import GroundParams
 from gbas_msgs_py.records import ServiceType
-from gbas_sim.fronts import WedgeFront
-from gbas_sim.paths import SignalPaths
+from gbas_sim.atmosphere.fronts import WedgeFront
+from gbas_sim.atmosphere.paths import SignalPaths
 from gbas_sim.world import SimulatedEpoch, World, WorldParams
-from gbas_studies.chain import AirborneOutput, Chain, GroundOutput
 
 _SCALARS: Final = ("vpl_m", "lpl_m", "val_m", "lal_m", "service", "alert")
 

@@ -14,17 +14,17 @@ import numpy as np
 from scipy.signal import lfilter
 
 from gbas_core.compiled import compiled
-from gbas_core.record import FloatArray
+from gbas_core.positioning.wls import projection_matrix, vertical_lateral
+from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import SAT_INDEX, SYSTEM_MASKS
-from gbas_core.wls import projection_matrix, vertical_lateral
-from gbas_ground.corrections import BoolArray
 from gbas_ground.params import GroundParams
-from gbas_sim.fronts import WedgeFront
+from gbas_sim.atmosphere.fronts import WedgeFront
 from gbas_studies.fronts.quiet import Flight, Observed
 
 
 def delay_m(front: WedgeFront, observed: Observed, satellite: int) -> FloatArray:
-    """Slant delay of a satellite at all receivers, ``(T, R)`` [m]: as :meth:`gbas_sim.fronts.WedgeFront.delay`.
+    """Slant delay of a satellite at all receivers, ``(T, R)`` [m]: as
+    :meth:`gbas_sim.atmosphere.fronts.WedgeFront.delay`.
 
     Only of fronts whose distance is that of the rays.
     """
@@ -46,7 +46,7 @@ def smoothed_m(delay: FloatArray, tracked: BoolArray, interval_s: float, tau_s: 
     delay, tracked : (T, ...) arrays
         Delays [m]; channels that are there: a filter starts with the first epoch, weighted 1/n while it fills.
 
-    Source: as :func:`gbas_core.smoothing.smooth_step` ("variable").
+    Source: as :func:`gbas_core.ranging.smoothing.smooth_step` ("variable").
     """
     shape = delay.shape
     columns = _smoothed(  # type: ignore[no-untyped-call]  # compiled

@@ -1,0 +1,1 @@
+"""Position, deviations from the final approach path, alert limits."""

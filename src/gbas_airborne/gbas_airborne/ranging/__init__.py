@@ -1,0 +1,1 @@
+"""Corrected ranges, and why the others are not used."""

@@ -1,0 +1,1 @@
+"""What the station has told, from VDB bursts."""

@@ -1,0 +1,427 @@
+"""Is a bag whole, readable by others, in order, and can its alerts be traced?
+
+A problem names file, topic and index. A note is something a person should know that is no fault of the bag.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import math
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from mcap.reader import make_reader
+from mcap.stream_reader import StreamReader
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
+from rosbags.typesys.store import Typestore
+
+from gbas_bags import epochs
+from gbas_bags.bags import METADATA_FILE, bag_files
+from gbas_bags.mcap_scan import McapScan, Message
+from gbas_bags.topic_names import contract_name, is_ephemeris, is_observation, is_progress, split
+from gbas_core.gnss.gpstime import calendar_text, epoch_key, from_epoch_key
+from gbas_core.record import Record
+from gbas_core.satellites import SAT_IDS, SAT_INDEX
+from gbas_msgs_py import topics
+from gbas_msgs_py.codes import SATELLITE_MONITORS
+from gbas_msgs_py.events import Event, EventError, EventKind
+from gbas_msgs_py.records import GROUND_MONITORS, MonitorEpoch, MonitorState, ProtectionEpoch
+from gbas_msgs_py.ros import BURST_LABEL, burst_from_msg, table_from_msg
+from gbas_msgs_py.schema import SchemaError
+from gbas_vdb.transmission.receive import decode_burst
+
+MAX_PROBLEMS: Final = 1000
+"""More are counted but not listed."""
+UNFINISHED_EPOCHS: Final = 16
+"""Epochs at either end of a recording that may be without outputs: they were under way."""
+_COMPARING_CAUSES: Final = ("_above_", "timeout")
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Something that is wrong with a bag, and where."""
+
+    what: str
+    file: str
+    topic: str | None = None
+    index: int | None = None
+
+    def __str__(self) -> str:
+        place = self.file
+        if self.topic is not None:
+            place += f": {self.topic}"
+        if self.index is not None:
+            place += f" message {self.index}"
+        return f"{place}: {self.what}"
+
+
+@dataclass
+class CheckResult:
+    """What a check found."""
+
+    bag: Path
+    messages: int = 0
+    problems: list[Problem] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    unlisted: int = 0
+    checked: Counter[str] = field(default_factory=Counter)
+
+    @property
+    def ok(self) -> bool:
+        """Whether nothing is wrong."""
+        return not self.problems
+
+    def problem(self, problem: Problem) -> None:
+        """Note a problem."""
+        if len(self.problems) < MAX_PROBLEMS:
+            self.problems.append(problem)
+        else:
+            self.unlisted += 1
+
+    def as_json(self) -> dict[str, Any]:
+        """The result as JSON-able data."""
+        return {
+            "bag": str(self.bag),
+            "ok": self.ok,
+            "messages": self.messages,
+            "checked": dict(self.checked),
+            "problems": [
+                {"file": each.file, "topic": each.topic, "index": each.index, "what": each.what}
+                for each in self.problems
+            ],
+            "problems_not_listed": self.unlisted,
+            "notes": self.notes,
+        }
+
+
+def check(path: Path) -> CheckResult:
+    """Check a bag.
+
+    Raises
+    ------
+    BagError
+        When there is no such bag, or a file of it is no MCAP at all.
+    """
+    result = CheckResult(path)
+    contents = _Contents(result)
+    for file in bag_files(path):
+        count = contents.read(file)
+        result.messages += count
+        _check_with_mcap(file, count, result)
+    _check_with_rosbags(path, result)
+    contents.check_order()
+    contents.check_frames()
+    contents.check_alerts()
+    contents.check_exclusions()
+    return result
+
+
+# --- other readers
+
+
+def _check_with_mcap(file: Path, count: int, result: CheckResult) -> None:
+    """The mcap library must read it, with every CRC, and its summary must be true."""
+    try:
+        with file.open("rb") as stream:
+            for _ in StreamReader(stream, validate_crcs=True).records:
+                pass
+        with file.open("rb") as stream:
+            summary = make_reader(stream).get_summary()
+        counted = summary.statistics.message_count if summary and summary.statistics else None
+        if counted != count:
+            result.problem(Problem(f"its summary counts {counted} messages, and it holds {count}", str(file)))
+        result.checked["files read by mcap"] += 1
+    except Exception as error:  # whatever the library makes of damaged bytes
+        result.problem(Problem(f"mcap cannot read it: {_text(error)}", str(file)))
+
+
+def _check_with_rosbags(path: Path, result: CheckResult) -> None:
+    """The rosbags library must read it, as tools for rosbag2 do."""
+    if path.is_dir() and not (path / METADATA_FILE).is_file():
+        result.problem(Problem(f"{METADATA_FILE} is missing; rosbag2 needs it", str(path)))
+        return
+    try:
+        with AnyReader([path]) as reader:
+            count = sum(1 for _ in reader.messages())
+        if count != result.messages:
+            result.problem(Problem(f"rosbags reads {count} messages of {result.messages}", str(path)))
+        result.checked["messages read by rosbags"] += count
+    except Exception as error:  # whatever the library makes of damaged bytes
+        result.problem(Problem(f"rosbags cannot read it: {_text(error)}", str(path)))
+
+
+def _text(error: Exception) -> str:
+    return str(error) or type(error).__name__
+
+
+# --- contents
+
+
+@dataclass
+class _Series:
+    """Epochs of a topic in order, with the index of each message."""
+
+    file: str
+    keys: list[int] = field(default_factory=list)
+    last_sequence: int = 0
+
+
+@dataclass
+class _Frame:
+    """Bursts of a VDB frame."""
+
+    expected: int
+    index: int
+    file: str
+    slots: list[int] = field(default_factory=list)
+
+
+class _Contents:
+    """Decodes every message of a bag and remembers what the later checks need."""
+
+    def __init__(self, result: CheckResult) -> None:
+        self._result = result
+        self._stores: dict[str, Typestore] = {}
+        self._indices: Counter[str] = Counter()
+        self._series: dict[str, _Series] = {}
+        self._frames: dict[str, dict[int, _Frame]] = defaultdict(dict)
+        self._protection: dict[str, list[tuple[int, int, str, ProtectionEpoch]]] = defaultdict(list)
+        self._alerts: dict[int, list[Event]] = defaultdict(list)
+        self._exclusions: list[Event] = []
+        self._failed: dict[tuple[int, str, str], tuple[float, float]] = {}
+        self._specs = {topics.resolve(spec.name): spec for spec in topics.TOPICS}
+
+    def read(self, file: Path) -> int:
+        """Decode a file; returns the number of its messages."""
+        scan = McapScan(file)
+        count = 0
+        for message in scan.messages():
+            count += 1
+            self._message(str(file), message)
+        for damage in scan.damages:
+            lost = "" if not damage.lost else f"; lost: {_counts(damage.lost)}"
+            self._result.problem(Problem(f"at byte {damage.offset}: {damage.what}{lost}", str(file)))
+        return count
+
+    def _message(self, file: str, message: Message) -> None:
+        topic = message.channel.topic
+        index = self._indices[topic]
+        self._indices[topic] += 1
+
+        def wrong(what: str) -> None:
+            self._result.problem(Problem(what, file, topic, index))
+
+        self._sequence(file, topic, message, wrong)
+        try:
+            decoded = self._deserialised(message)
+            self._contract(file, topic, index, message, decoded)
+        except (SchemaError, EventError, epochs.PayloadError) as error:
+            wrong(str(error))
+            self._keep_place(topic, message)
+            return
+        self._result.checked["payloads decoded"] += 1
+
+    def _keep_place(self, topic: str, message: Message) -> None:
+        """A message that cannot be used is not missing as well."""
+        with contextlib.suppress(epochs.PayloadError):
+            key = epochs.epoch_of(message.channel.schema.name, message.data)
+            keys = self._series[topic].keys
+            if key is not None and message.channel.schema.name == epochs.TABLE_TYPE and (not keys or keys[-1] < key):
+                keys.append(key)
+
+    def _sequence(self, file: str, topic: str, message: Message, wrong: Callable[[str], None]) -> None:
+        series = self._series.setdefault(topic, _Series(file))
+        if message.sequence and series.last_sequence and message.sequence != series.last_sequence + 1:
+            wrong(f"has number {message.sequence} after {series.last_sequence}: messages are missing or out of order")
+        series.last_sequence = message.sequence
+
+    def _deserialised(self, message: Message) -> Any:
+        """The message by the definition that stands in the bag itself."""
+        schema = message.channel.schema
+        try:
+            if schema.name not in self._stores:
+                store = get_typestore(Stores.EMPTY)
+                store.register(get_types_from_msg(schema.text, schema.name))
+                self._stores[schema.name] = store
+            return self._stores[schema.name].deserialize_cdr(message.data, schema.name)
+        except (TypesysError, KeyError) as error:
+            raise epochs.PayloadError(f"the definition of {schema.name!r} cannot be used: {_text(error)}") from None
+        except Exception as error:  # rosbags lets whatever the bytes provoke through
+            raise epochs.PayloadError(f"is no {schema.name}: {_text(error)}") from None
+
+    def _contract(self, file: str, topic: str, index: int, message: Message, decoded: Any) -> None:
+        """What the topic carries must follow the contract."""
+        spec = self._specs.get(topic) or self._specs.get(topics.resolve(contract_name(topic)))
+        kind = message.channel.schema.name
+        if spec is not None and spec.message_type != kind:
+            raise SchemaError(f"has type {kind}, expected {spec.message_type}")
+        if kind == epochs.TABLE_TYPE and topic.startswith(f"{topics.DEFAULT_NAMESPACE}/"):
+            self._table(file, topic, index, decoded, spec.schema if spec else None)
+        elif kind == epochs.BURST_TYPE and topic.startswith(f"{topics.DEFAULT_NAMESPACE}/"):
+            self._burst(file, topic, index, decoded)
+        elif topic == topics.EVENTS:
+            event = Event.from_json(decoded.data)
+            if event.kind is EventKind.ALERT:
+                self._alerts[event.epoch].append(event)
+            elif event.kind is EventKind.EXCLUSION and event.cause in SATELLITE_MONITORS and event.subject in SAT_INDEX:
+                self._exclusions.append(event)
+
+    def _table(self, file: str, topic: str, index: int, decoded: Any, schema: str | None) -> None:
+        record: Record = table_from_msg(decoded)
+        label = decoded.layout.dim[1].label.partition(":")[0]
+        if schema is not None and label != schema:
+            raise SchemaError(f"has schema {label!r}, expected {schema!r}")
+        key = epoch_key(record.gps_week, record.tow_s)
+        self._series[topic].keys.append(key)
+        if isinstance(record, ProtectionEpoch):
+            self._protection[topic].append((key, index, file, record))
+        elif isinstance(record, MonitorEpoch):
+            for row, satellite in np.argwhere(record.state == MonitorState.FAILED):
+                values = float(record.statistic[row, satellite]), float(record.threshold[row, satellite])
+                self._failed[key, GROUND_MONITORS[row], SAT_IDS[satellite]] = values
+
+    def _burst(self, file: str, topic: str, index: int, decoded: Any) -> None:
+        burst = burst_from_msg(decoded)
+        key = epoch_key(burst.gps_week, burst.tow_s)
+        frame = self._frames[topic].setdefault(key, _Frame(burst.bursts_in_frame, index, file))
+        frame.slots.append(burst.slot)
+        if len(frame.slots) == 1:
+            self._series[topic].keys.append(key)
+        if burst.payload:
+            errors = decode_burst(burst).errors
+            if errors:
+                raise SchemaError(f"{BURST_LABEL}: {errors[0].reason}")
+
+    # --- order and completeness
+
+    def check_order(self) -> None:
+        """Epochs must grow, receivers must have them all, and every input must have its output."""
+        for topic, series in self._series.items():
+            if is_ephemeris(topic) or is_progress(topic):
+                continue  # a reception, and how far a reader is, may be said twice
+            for index, (before, after) in enumerate(itertools.pairwise(series.keys), start=1):
+                if after <= before:
+                    what = f"epoch {_epoch(after)} after {_epoch(before)}"
+                    self._result.problem(Problem(what, series.file, topic, index))
+        ground = {name: series for name, series in self._series.items() if _is_ground_observation(name)}
+        observed = sorted({key for series in ground.values() for key in series.keys})
+        for topic, series in ground.items():
+            self._complete(topic, series, observed, "another receiver has")
+        self._outputs(observed)
+        self._gaps(observed)
+
+    def _outputs(self, observed: list[int]) -> None:
+        for topic, series in self._series.items():
+            namespace, name = split(topic)
+            if name in (topics.GROUND_INTEGRITY, topics.GROUND_MONITORS, topics.GROUND_CHANNELS):
+                self._complete(topic, series, observed, "was observed")
+            elif name in (topics.AIRBORNE_SOLUTION, topics.AIRBORNE_PROTECTION):
+                source = self._series.get(f"{namespace}/{topics.AIRBORNE_OBSERVATIONS}")
+                self._complete(topic, series, sorted(source.keys) if source else [], "was observed")
+            elif topic in self._frames:
+                self._complete(topic, series, observed, "was observed")
+
+    def _complete(self, topic: str, series: _Series, expected: list[int], why: str) -> None:
+        there = set(series.keys)
+        missing = [key for key in expected if key not in there]
+        if not missing or not there:
+            if missing:
+                self._result.problem(Problem(f"none of {len(missing)} epochs is there", series.file, topic))
+            return
+        inside = [key for key in missing if min(there) < key < max(there)]
+        ends = len(missing) - len(inside)
+        if inside:
+            what = f"{len(inside)} epochs are missing that {why}, the first is {_epoch(inside[0])}"
+            self._result.problem(Problem(what, series.file, topic))
+        if ends > UNFINISHED_EPOCHS:
+            self._result.problem(Problem(f"{ends} epochs at the ends are missing that {why}", series.file, topic))
+        elif ends:
+            self._result.notes.append(f"{topic}: {ends} epochs at the ends of the recording were under way")
+
+    def _gaps(self, observed: list[int]) -> None:
+        """A gap in which no receiver observed anything is the receivers' doing; the numbering shows what was lost."""
+        steps = Counter(after - before for before, after in itertools.pairwise(observed))
+        if not steps:
+            return
+        interval = steps.most_common(1)[0][0]
+        for before, after in itertools.pairwise(observed):
+            if after - before > interval:
+                self._result.notes.append(
+                    f"no receiver observed for {(after - before) / 1000.0:g} s after {_epoch(before)}"
+                )
+
+    def check_frames(self) -> None:
+        """A frame must have the bursts it says it has, each slot once; the last may have been under way."""
+        for topic, frames in self._frames.items():
+            last = max(frames)
+            for key, frame in frames.items():
+                expected = max(frame.expected, 1)  # an empty frame travels as one message
+                if len(frame.slots) < expected and key == last:
+                    continue
+                if len(frame.slots) != expected or len(set(frame.slots)) != len(frame.slots):
+                    what = f"frame {_epoch(key)} has {len(frame.slots)} bursts, and says {expected}"
+                    self._result.problem(Problem(what, frame.file, topic, frame.index))
+                self._result.checked["VDB frames"] += 1
+
+    def check_alerts(self) -> None:
+        """Each beginning and end of an alert must have an event of its epoch, with the cause and what was compared."""
+        for topic, rows in self._protection.items():
+            before: float | None = None
+            for key, index, file, record in rows:
+                alert = record.alert
+                if alert != before and not (before is None and alert == 0.0):
+                    self._trace(topic, key, index, file, begins=alert != 0.0)
+                before = alert
+                self._result.checked["protection levels"] += 1
+
+    def check_exclusions(self) -> None:
+        """Each satellite a monitor excluded must have failed in that monitor's table, by the same value."""
+        topic = topics.resolve(topics.GROUND_MONITORS)
+        if topic not in self._series:
+            return
+        for event in self._exclusions:
+            names = SATELLITE_MONITORS[event.cause]
+            measured = [self._failed.get((event.epoch, name, event.subject)) for name in names]
+            if (event.value, event.threshold) not in measured:
+                what = f"the exclusion of {event.subject} at {_epoch(event.epoch)} by {event.cause} is not in the table"
+                self._result.problem(Problem(what, self._series[topic].file, topic))
+            self._result.checked["exclusions traced"] += 1
+
+    def _trace(self, topic: str, key: int, index: int, file: str, *, begins: bool) -> None:
+        events = [event for event in self._alerts.get(key, []) if (event.cause == "cleared") != begins]
+        if not events:
+            what = f"the {'alert' if begins else 'end of an alert'} at {_epoch(key)} has no event"
+            self._result.problem(Problem(what, file, topic, index))
+            return
+        for event in events:
+            compared = any(mark in event.cause for mark in _COMPARING_CAUSES)
+            if compared and not (math.isfinite(event.threshold) and not math.isnan(event.value)):
+                what = f"the event of the alert at {_epoch(key)}, {event.cause}, lacks value or threshold"
+                self._result.problem(Problem(what, file, topic, index))
+            self._result.checked["alerts traced"] += 1
+
+
+def _is_ground_observation(topic: str) -> bool:
+    return is_observation(topic) and "/ground/" in topic
+
+
+def _epoch(key: int) -> str:
+    week, tow_s = from_epoch_key(key)
+    return f"{week} {tow_s:.3f} ({calendar_text(week, tow_s)})"
+
+
+def _counts(lost: dict[str, int]) -> str:
+    return ", ".join(f"{count} of {topic}" for topic, count in sorted(lost.items()))
+
+
+def problems_of(result: CheckResult) -> Iterator[str]:
+    """The problems as lines."""
+    yield from (str(problem) for problem in result.problems)
+    if result.unlisted:
+        yield f"and {result.unlisted} more"

@@ -1,0 +1,33 @@
+from setuptools import find_packages, setup
+
+PACKAGE = "gbas_bags"
+
+setup(
+    name=PACKAGE,
+    version="0.1.0",
+    description="Bags: recorder, player, reading and checking, and saving what is left of damaged ones.",
+    license="Apache-2.0",
+    maintainer="GBAS suite developers",
+    maintainer_email="dev@example.org",
+    python_requires=">=3.11",
+    packages=find_packages(include=[PACKAGE, f"{PACKAGE}.*"]),
+    package_data={PACKAGE: ["py.typed"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
+        (f"share/{PACKAGE}", ["package.xml"]),
+    ],
+    install_requires=[
+        "gbas_core",
+        "gbas_vdb",
+        "gbas_msgs_py",
+        "gbas_node",
+        "lz4",
+        "mcap",
+        "numpy",
+        "rosbags",
+        "PyYAML",
+        "zstandard",
+    ],
+    zip_safe=True,
+    entry_points={"console_scripts": ["recorder = gbas_bags.recorder:main", "player = gbas_bags.player:main"]},
+)

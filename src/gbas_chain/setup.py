@@ -1,0 +1,31 @@
+from setuptools import find_packages, setup
+
+PACKAGE = "gbas_chain"
+
+setup(
+    name=PACKAGE,
+    version="0.1.0",
+    description="The whole chain offline: station, broadcast and aircraft over recorded files, and its results.",
+    license="Apache-2.0",
+    maintainer="GBAS suite developers",
+    maintainer_email="dev@example.org",
+    python_requires=">=3.11",
+    packages=find_packages(include=[PACKAGE, f"{PACKAGE}.*"]),
+    package_data={PACKAGE: ["py.typed"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
+        (f"share/{PACKAGE}", ["package.xml"]),
+    ],
+    install_requires=[
+        "gbas_core",
+        "gbas_vdb",
+        "gbas_msgs_py",
+        "gbas_ground",
+        "gbas_airborne",
+        "gbas_bringup",
+        "matplotlib",
+        "numpy",
+        "PyYAML",
+    ],
+    zip_safe=True,
+)

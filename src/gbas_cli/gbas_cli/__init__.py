@@ -1,0 +1,1 @@
+"""The ``gbas`` command: one module a group of subcommands."""

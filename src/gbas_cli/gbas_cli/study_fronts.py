@@ -1,0 +1,167 @@
+"""``gbas study fronts``: ionospheric fronts against a station and an aircraft, with protection and without."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from gbas_cli.base import Json, print_json
+from gbas_core.errors import GbasError
+
+if TYPE_CHECKING:
+    from gbas_studies.fronts.campaign import Plan
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command()(fronts)
+
+
+def fronts(
+    threat: Annotated[
+        str, typer.Option(help="Threat model the fronts are drawn from: conus, germany, or '' for the station's own.")
+    ] = "",
+    protection: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME[:KEY=VALUE,...]",
+            help="A station to meet them: none, or a threat model with keys of its ionosphere section; may be repeated "
+            "(default: none and the scenario's own).",
+        ),
+    ] = None,
+    systems: Annotated[str, typer.Option(help="Constellations of station and aircraft: G, E or GE.")] = "GE",
+    runs: Annotated[int, typer.Option(help="Fronts, shared by the kinds.", min=1)] = 700,
+    kind: Annotated[list[str] | None, typer.Option(help="Kind of fronts; may be repeated (default: all).")] = None,
+    within: Annotated[float, typer.Option(help="Distance to the threshold looked at, in m.", min=100.0)] = 6_000.0,
+    seed: Annotated[int, typer.Option(help="Of the fronts.", min=0)] = 1,
+    scenario: Annotated[str, typer.Option(help="World without threats: a .yaml file, or a name.")] = "quiet_approach",
+    workers: Annotated[int, typer.Option(help="Processes; the result is the same.", min=1, max=64)] = 1,
+    out: Annotated[Path | None, typer.Option(help="File for the table as JSON.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Put fronts of a threat model before a station and its aircraft, and count misleading positions.
+
+    A position is misleading when its error exceeds its protection level, with service and without alert.
+    """
+    from gbas_bringup.progress import progress
+    from gbas_studies.fronts.campaign import KINDS, run_campaign
+
+    kinds = tuple(kind or KINDS)
+    for each in kinds:
+        if each not in KINDS:
+            raise GbasError(f"--kind {each!r} is not one of {', '.join(KINDS)}")
+    plan = plan_of(
+        scenario, threat=threat, protections=tuple(protection or ()), systems=systems, runs=runs, kinds=kinds,
+        within_m=within, seed=seed,
+    )  # fmt: skip
+    with progress("fronts", enabled=not as_json) as update:
+        rows = run_campaign(plan, workers=workers, progress=lambda done, total: update(done, total, ""))
+    if out is not None:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        out.write_text(json.dumps(rows, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    if as_json:
+        print_json({"rows": rows})
+    else:
+        _print(rows)
+
+
+def plan_of(
+    scenario: str,
+    *,
+    threat: str = "",
+    protections: Sequence[str] = (),
+    systems: str = "GE",
+    runs: int = 700,
+    kinds: Sequence[str] = (),
+    within_m: float = 6_000.0,
+    seed: int = 1,
+    interval_s: float | None = None,
+) -> Plan:
+    """The campaign on a scenario: its world without threats, as long as filters and approach take.
+
+    Raises
+    ------
+    GbasError, ParameterError
+        For a threat model or a station that is none.
+    """
+    from dataclasses import replace
+
+    from gbas_airborne.params import AirborneParams
+    from gbas_bringup.resources import named_config
+    from gbas_ground.ionosphere.section import NO_THREAT
+    from gbas_ground.ionosphere.threat import THREATS
+    from gbas_ground.params import GroundParams
+    from gbas_sim.flight.straight_in import StraightIn
+    from gbas_sim.scenario import read_sections, scenario_from_yaml
+    from gbas_studies.fronts.campaign import KINDS, Plan
+
+    path = named_config(scenario)
+    sections, world = read_sections(path), scenario_from_yaml(path)
+    if not isinstance(world.flight, StraightIn):
+        raise GbasError(f"--scenario {scenario} has no straight approach")
+    ground = dict(sections["ground"]) | {"station": dict(sections["ground"]["station"]) | {"systems": systems}}
+    own = dict(ground.get("ionosphere", {}))
+    stations = {}
+    for text in protections or (NO_THREAT, "own"):
+        name, _, keys = text.partition(":")
+        section = own if name == "own" else {"threat_model": name}
+        given = {key: _value(value) for key, _, value in (each.partition("=") for each in keys.split(",") if each)}
+        # the distance of use belongs to the protection: so far it is screened
+        distance = {key: given.pop(key) for key in ("max_use_distance_m",) if key in given}
+        stations[text] = GroundParams.from_mapping(
+            ground | {"ionosphere": section | given, "station": dict(ground["station"]) | distance},
+            source=f"--protection {text}",
+        )
+    drawn = threat or own.get("threat_model", NO_THREAT)
+    if drawn not in THREATS:
+        raise GbasError(f"--threat {drawn!r} is not one of {', '.join(THREATS)}")
+    flight = replace(world.flight, intercept_distance_m=within_m + 1_000.0, level_time_s=_LEVEL_S)
+    shorter_s = round(world.length_s - flight.duration_s, 1)  # it ends when the scenario's does
+    return Plan(
+        world=replace(
+            world,
+            flight=flight,
+            systems=systems,
+            faults=(),
+            fronts=(),
+            duration_s=None,
+            interval_s=interval_s or world.interval_s,
+            start_tow_s=world.start_tow_s + shorter_s,
+        ),
+        stations=stations,
+        aircraft=AirborneParams.from_mapping(dict(sections["airborne"]) | {"systems": systems}),
+        threat=THREATS[drawn],
+        kinds=tuple(kinds or KINDS),
+        runs=runs,
+        within_m=within_m,
+        seed=seed,
+    )
+
+
+_LEVEL_S = 270.0  # filters on the ground and on board settle in 230 s
+
+
+def _value(text: str) -> Any:
+    import yaml
+
+    return yaml.safe_load(text)
+
+
+def _print(rows: Sequence[dict[str, Any]]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table("station", "fronts", "runs", "misleading runs (epochs)", "largest error of level", "largest vertical",
+                  "excluded", "service lost", box=None, pad_edge=False)  # fmt: skip
+    for row in rows:
+        lost = row["lost_epochs"] / max(1, row["epochs"] + row["lost_epochs"])
+        table.add_row(
+            row["station"], row["kind"], str(row["runs"]), f"{row['misleading_runs']} ({row['misleading_epochs']})",
+            f"{row['error_m']:.2f} of {row['level_m']:.2f} m, {row['largest_ratio']:.2f}",
+            f"{row['largest_vertical_m']:.2f} m", f"{row['excluded_runs']}", f"{100.0 * lost:.1f} %",
+        )  # fmt: skip
+    Console(highlight=False, width=None if Console().is_terminal else 160).print(table)

@@ -1,0 +1,1 @@
+"""GPS time, Earth-fixed frames, ephemerides and orbits, and what one receiver observes."""

@@ -1,0 +1,1 @@
+"""Error models of the standard, and the multipliers of its protection levels."""

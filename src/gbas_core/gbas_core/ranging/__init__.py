@@ -1,0 +1,1 @@
+"""From raw code and carrier to smoothed ranges: slips, Hatch filter, combinations, divergence filters."""

@@ -1,0 +1,1 @@
+"""What every channel (receiver and satellite) measures, against what is expected of it."""

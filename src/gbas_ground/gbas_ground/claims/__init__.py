@@ -1,0 +1,1 @@
+"""What the broadcast claims, what each claim rests on, and what is refused."""

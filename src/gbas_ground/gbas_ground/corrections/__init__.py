@@ -1,0 +1,1 @@
+"""Corrections: formed, made to agree, and bounded."""

@@ -1,0 +1,575 @@
+"""All monitors of the satellites' signals at one epoch: what they need, in which order, and what their verdict means.
+
+The monitors themselves are in :mod:`gbas_ground.monitors`, each blind to the others. Here they are given the same
+channels, and their verdicts become exclusions of satellites: a satellite that fails is excluded from both smoothing
+constants and all bands, and one that a required monitor cannot judge yet is not used yet.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from gbas_core.ranging.divergence import DivergenceState
+from gbas_core.record import BoolArray, FloatArray
+from gbas_core.satellites import CLOCK_GROUPS, missing
+from gbas_core.signals import L1, L5, N_BANDS
+from gbas_ground.channels.predicted_ranges import Expected
+from gbas_ground.claims.orbit_claim import MAX_DECORRELATION, OrbitSite, orbit_bound
+from gbas_ground.monitors.carrier_acceleration import (
+    CarrierAccelerationParams,
+    CarrierAccelerationResult,
+    CarrierAccelerationState,
+    carrier_acceleration_step,
+    initial_carrier_acceleration,
+)
+from gbas_ground.monitors.code_carrier_divergence import CcdParams, ccd_step, initial_ccd
+from gbas_ground.monitors.common_slip import check_common_slip
+from gbas_ground.monitors.divergence_classification import MODES, NO_FAULT, classify
+from gbas_ground.monitors.double_difference import (
+    DoubleDifferences,
+    Troposphere,
+    carrier_residual_m,
+    double_differences,
+    reference_satellites,
+)
+from gbas_ground.monitors.ephemeris_residual import (
+    EphemerisResidualParams,
+    EphemerisResidualState,
+    ephemeris_residual_step,
+    initial_ephemeris_residual,
+)
+from gbas_ground.monitors.ionosphere_gradient import (
+    GradientResult,
+    GradientSite,
+    IonosphereGradientParams,
+    check_ionosphere_gradient,
+    gradient_site,
+)
+from gbas_ground.monitors.monitor_table import Look, look, place_of_worst, worst_of
+from gbas_ground.monitors.power_expectation import (
+    PowerExpectationParams,
+    PowerExpectationState,
+    initial_power_expectation,
+    power_expectation_step,
+)
+from gbas_ground.monitors.result import MonitorResult
+from gbas_ground.monitors.shared_receiver import Planes, SharedReceiver, planes_of, seen_quiet, shared_receiver
+from gbas_ground.monitors.two_frequency_divergence import (
+    TwoFrequencyEpoch,
+    TwoFrequencyInput,
+    TwoFrequencyParams,
+    TwoFrequencyState,
+    initial_two_frequency,
+    two_frequency_step,
+)
+from gbas_ground.params import GroundParams
+from gbas_msgs_py.codes import ExclusionCause
+from gbas_msgs_py.records import BASELINES, MAX_REFERENCE_RECEIVERS
+
+_CARRIER_CAUSES: Final = (
+    ("carrier_step", ExclusionCause.CARRIER_STEP),
+    ("carrier_rate", ExclusionCause.CARRIER_RATE),
+    ("acceleration", ExclusionCause.CARRIER_ACCELERATION),
+)
+"""Names and causes in the order of the acceleration monitor's statistics."""
+_GRADUAL: Final = frozenset(
+    {
+        ExclusionCause.CODE_CARRIER_DIVERGENCE,
+        ExclusionCause.TWO_FREQUENCY_DIVERGENCE,  # a square
+        ExclusionCause.IONOSPHERE_GRADIENT,
+        ExclusionCause.EPHEMERIS_RESIDUAL,
+    }
+)
+"""Causes whose statistic is a size in noise; a share of its threshold means something."""
+
+
+class Seen(NamedTuple):
+    """What monitors may look at, at one epoch.
+
+    Attributes
+    ----------
+    code_m, carrier_m, cn0_dbhz : (R, N_BANDS, N) arrays
+        Of all channels that were measured; NaN where not.
+    slipped : (R, N_BANDS, N) bool array
+        Where a carrier and the one before do not belong together.
+    usable : (R, N) bool array
+        Channels of satellites above the mask that are tracked, and that nothing excludes, nor their satellite.
+    ready : (R, N) bool array
+        Channels whose smoothing filter has settled, and whose receiver is not excluded either.
+    suspended : (R, N) bool array
+        Channels that have settled too, of receivers that are excluded.
+    in_use : (N,) bool array
+        Satellites that were broadcast at the epoch before.
+    due : (N,) bool array
+        Satellites that would be broadcast if nothing else were against it.
+    may_refer : (N,) bool array
+        Satellites others may be compared with.
+    expected : Expected
+    rebased : (N,) bool array
+        Satellites whose ephemeris is another than at the epoch before.
+    shift_m : (R, N) array
+        What another ephemeris adds to a carrier less what is expected of it [m].
+    dt_s : float
+        Time since the epoch before; NaN at the first [s].
+    """
+
+    code_m: FloatArray
+    carrier_m: FloatArray
+    cn0_dbhz: FloatArray
+    slipped: BoolArray
+    usable: BoolArray
+    ready: BoolArray
+    suspended: BoolArray
+    in_use: BoolArray
+    due: BoolArray
+    may_refer: BoolArray
+    expected: Expected
+    rebased: BoolArray
+    shift_m: FloatArray
+    dt_s: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class WatchState:
+    """What the monitors remember between epochs."""
+
+    ccd: DivergenceState
+    ccd_f: TwoFrequencyState
+    acceleration: CarrierAccelerationState
+    ephemeris: EphemerisResidualState
+    power: PowerExpectationState
+
+
+class Verdict(NamedTuple):
+    """What one monitor decided about satellites ``(N,)`` or channels ``(R, N)``, where that counts."""
+
+    cause: ExclusionCause
+    result: MonitorResult
+
+
+class _Part(NamedTuple):
+    """What one monitor has to say.
+
+    Attributes
+    ----------
+    looks : mapping from a monitor's name to Look
+    details : mapping from a field of :class:`MonitorEpoch` to its value
+    satellites, channels : tuple of Verdict
+        What follows from it; nothing from a monitor that is only watched.
+    ready : (N,) bool array or None
+        Satellites it could judge, where that is required.
+    """
+
+    looks: Mapping[str, Look]
+    details: Mapping[str, Any] = {}
+    satellites: tuple[Verdict, ...] = ()
+    channels: tuple[Verdict, ...] = ()
+    ready: BoolArray | None = None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Watched:
+    """What all monitors found at one epoch.
+
+    Attributes
+    ----------
+    satellites, channels : tuple of Verdict
+        What has to be excluded, and why.
+    receivers : MonitorResult
+        ``(R,)``: satellites that point to each receiver; it fails where they name it.
+    receivers_quiet : (R,) array
+        1 where a receiver that is excluded would do on its baselines, 0 where not, NaN where nobody can tell.
+    ready : (N,) bool array
+        Satellites that every required monitor could judge.
+    orbit_bound : (N,) array
+        P that the ephemeris monitor supports, :func:`~gbas_ground.claims.orbit_claim.orbit_bound` [m/m].
+    looks : mapping from a monitor's name to Look
+    details : mapping from a field of :class:`MonitorEpoch` to its value
+    """
+
+    satellites: tuple[Verdict, ...]
+    channels: tuple[Verdict, ...]
+    receivers: MonitorResult
+    receivers_quiet: FloatArray
+    ready: BoolArray
+    orbit_bound: FloatArray
+    looks: Mapping[str, Look]
+    details: Mapping[str, Any]
+
+    def passed(self, share: float) -> BoolArray:
+        """Satellites that were judged, not failed, and are below `share` of every threshold, ``(N,)``.
+
+        What is excluded just above a threshold must not come back just below it.
+        """
+        passed = self.ready
+        for cause, result in self.satellites:
+            passed = passed & ~result.failed
+            if cause in _GRADUAL:
+                part = share**2 if cause == ExclusionCause.TWO_FREQUENCY_DIVERGENCE else share
+                passed = passed & ~(result.statistic > part * result.threshold)
+        return passed
+
+
+class _Settings(NamedTuple):
+    """Parameters and constants of the monitors; made once from the station's parameters."""
+
+    ccd: CcdParams
+    ccd_f: TwoFrequencyParams
+    acceleration: CarrierAccelerationParams
+    gradient: IonosphereGradientParams
+    gradient_required: bool
+    ephemeris: EphemerisResidualParams
+    orbit_required: bool
+    power: PowerExpectationParams
+    site: GradientSite
+    orbit_site: OrbitSite
+    planes: tuple[Planes, ...]
+    troposphere: Troposphere
+
+
+@lru_cache(maxsize=8)
+def _settings(params: GroundParams) -> _Settings:
+    sections = params.monitors
+    gradient = params.gradient_monitor()
+    ccd = sections.ccd.params(params.settle_time_s, params.max_gap_s)
+    site = gradient_site(params.receiver_positions_m(), params.reference_point_m(), gradient)
+    return _Settings(
+        ccd=ccd,
+        ccd_f=sections.ccd_f.params(ccd.filters, params.refractivity * 1e-6 * params.scale_height_m),
+        acceleration=sections.acceleration.params(params.max_gap_s, sections.carrier_noise.receiver_factor),
+        gradient=gradient,
+        gradient_required=sections.gradient.required or params.gast_d,
+        ephemeris=params.ephemeris_monitor(),
+        orbit_required=not params.external_monitor and (sections.ephemeris.required or params.gast_d),
+        power=sections.expected_power.params(params.max_gap_s),
+        site=site,
+        orbit_site=params.orbit_site(),
+        planes=planes_of(site.baselines, gradient.bands),
+        troposphere=Troposphere(refractivity=params.refractivity, scale_height_m=params.scale_height_m),
+    )
+
+
+def initial_watch(params: GroundParams) -> WatchState:
+    """Monitors that have seen nothing."""
+    settings, count = _settings(params), params.n_receivers
+    return WatchState(
+        ccd=initial_ccd(settings.ccd, count),
+        ccd_f=initial_two_frequency(settings.ccd_f, count),
+        acceleration=initial_carrier_acceleration(count, settings.acceleration),
+        ephemeris=initial_ephemeris_residual(len(settings.site.baselines), settings.ephemeris),
+        power=initial_power_expectation(count, settings.power),
+    )
+
+
+def watch(state: WatchState, seen: Seen, params: GroundParams) -> tuple[WatchState, Watched]:
+    """Run every monitor over one epoch."""
+    settings, sections = _settings(params), params.monitors
+    residual_m = _residual_m(seen, settings)
+    ccd, divergence = _ccd(state.ccd, seen, settings, exclude=sections.ccd.exclude)
+    ccd_f, two_frequency = _ccd_f(state.ccd_f, seen, settings, sections.ccd_f.exclude)
+    acceleration, carrier = _acceleration(
+        state.acceleration, residual_m, seen, settings, exclude=sections.acceleration.exclude
+    )
+    # A channel that jumped alone must not make a gradient of its satellite, nor what is left of a receiver's channels.
+    steady = seen.ready & _enough(seen.ready, params.min_common_satellites)
+    for verdict in carrier.channels:
+        steady = steady & ~verdict.result.failed
+    differences, receivers = _fitting_differences(residual_m, steady, seen, settings, params)
+    gradient = _gradient(differences, seen, settings, exclude=sections.gradient.exclude)
+    ephemeris, orbit, bound = _ephemeris(
+        state.ephemeris, differences, seen, settings, exclude=sections.ephemeris.exclude
+    )
+    power, expectation = _power(
+        state.power, seen, settings, exclude=sections.expected_power.exclude, required=params.require_cn0
+    )
+    parts = (_common_slip(seen), divergence, two_frequency, carrier, gradient, orbit, expectation)
+    ready = np.ones_like(seen.due)
+    for part in parts:
+        if part.ready is not None:
+            ready = ready & part.ready
+    watched = Watched(
+        satellites=tuple(verdict for part in parts for verdict in part.satellites),
+        channels=tuple(verdict for part in parts for verdict in part.channels),
+        receivers=receivers,
+        receivers_quiet=_quiet_receivers(residual_m, steady, seen, settings, params),
+        ready=ready,
+        orbit_bound=bound,
+        looks={name: each for part in parts for name, each in part.looks.items()},
+        details={name: each for part in parts for name, each in part.details.items()},
+    )
+    state = WatchState(ccd=ccd, ccd_f=ccd_f, acceleration=acceleration, ephemeris=ephemeris, power=power)
+    return state, watched
+
+
+def _common_slip(seen: Seen) -> _Part:
+    """A satellite that steps has no settled filters any more, so `due` does not have it."""
+    tracked = np.isfinite(seen.code_m[:, L1] + seen.carrier_m[:, L1])
+    result = check_common_slip(seen.slipped[:, L1], tracked, seen.in_use)
+    return _Part(
+        looks={"common_slip": look(result, seen.in_use)}, satellites=(Verdict(ExclusionCause.COMMON_SLIP, result),)
+    )
+
+
+def _ccd(state: DivergenceState, seen: Seen, settings: _Settings, *, exclude: bool) -> tuple[DivergenceState, _Part]:
+    state, epoch = ccd_step(state, seen.code_m, seen.carrier_m, seen.slipped, seen.ready, seen.dt_s, settings.ccd)
+    result = _row(epoch.satellites, L1)
+    by_receiver = missing(MAX_REFERENCE_RECEIVERS)
+    by_receiver[: len(epoch.receiver_mps)] = epoch.receiver_mps[:, L1]
+    return state, _Part(
+        looks={"ccd": look(result, seen.due)},
+        details={"ccd_receiver_mps": by_receiver},
+        satellites=_verdicts(exclude, (ExclusionCause.CODE_CARRIER_DIVERGENCE, result), seen.due),
+        ready=epoch.receivers[L1] > 0 if exclude else None,
+    )
+
+
+def _ccd_f(state: TwoFrequencyState, seen: Seen, settings: _Settings, exclude: str) -> tuple[TwoFrequencyState, _Part]:
+    """Where a satellite has no second band there is nothing to judge: the single-band monitor has it."""
+    params = settings.ccd_f
+    given = TwoFrequencyInput(
+        code_m=seen.code_m,
+        carrier_m=seen.carrier_m,
+        restarted=seen.slipped,
+        range_m=seen.expected.range_m,
+        clock_s=seen.expected.clock_s,
+        rebased=seen.rebased,
+        elevation_rad=seen.expected.elevation_rad,
+        used=seen.ready,
+        clock_used=seen.usable,
+    )
+    state, epoch = two_frequency_step(state, given, seen.dt_s, params)
+    forms = {"sound": epoch.sound, "paper": epoch.paper}
+    due = seen.due & (epoch.receivers > 0)
+    chosen = forms.get(exclude)
+    return state, _Part(
+        looks={"ccd_f": look(epoch.sound, due), "ccd_f_paper": look(epoch.paper, due)},
+        details={"divergence_mps": epoch.mean_mps, **_likeliest_mode(epoch, due, params)},
+        satellites=() if chosen is None else _verdicts(True, (ExclusionCause.TWO_FREQUENCY_DIVERGENCE, chosen), due),
+    )
+
+
+def _likeliest_mode(epoch: TwoFrequencyEpoch, due: BoolArray, params: TwoFrequencyParams) -> dict[str, FloatArray]:
+    """Mode and its probability of the satellites that fail; missing for the rest."""
+    failed = due & epoch.sound.failed & np.isfinite(epoch.sound.statistic)
+    if not failed.any():
+        return {}
+    found = classify(epoch.mean_mps[[0, 1, 3]][:, failed], epoch.covariance[failed], params.band, params.other)
+    mode, probability = missing(), missing()
+    number = found.posterior.argmax(axis=0)
+    mode[failed] = np.where(number == MODES.index(NO_FAULT), 0, number + 1)
+    probability[failed] = found.posterior.max(axis=0)
+    return {"ccd_f_mode": mode, "ccd_f_mode_probability": probability}
+
+
+def _acceleration(
+    state: CarrierAccelerationState, residual_m: FloatArray, seen: Seen, settings: _Settings, *, exclude: bool
+) -> tuple[CarrierAccelerationState, _Part]:
+    params = settings.acceleration
+    state, found = carrier_acceleration_step(
+        state,
+        residual_m[:, list(params.bands)],
+        seen.slipped[:, list(params.bands)],
+        seen.ready & seen.due,
+        seen.expected.elevation_rad,
+        seen.dt_s,
+        params,
+        shift_m=seen.shift_m,
+    )
+    known = np.isfinite(found.satellites.statistic[0, 0])
+    each = [_row(found.satellites, number) for number in range(len(_CARRIER_CAUSES))]
+    looks = {name: look(result, seen.due) for (name, _), result in zip(_CARRIER_CAUSES, each, strict=True)}
+    return state, _Part(
+        looks=looks,
+        satellites=_carrier_verdicts(found, seen.due & known) if exclude else (),
+        channels=_channel_verdicts(found) if exclude else (),
+        ready=known if exclude else None,
+    )
+
+
+def _carrier_verdicts(found: CarrierAccelerationResult, due: BoolArray) -> tuple[Verdict, ...]:
+    """A satellite's cause is the statistic that is furthest over its threshold."""
+    failed = due & found.failed_satellites
+    if not failed.any():
+        return ()
+    worst = worst_of(found.satellites, axes=2)
+    number, _ = place_of_worst(found.satellites, axes=2)
+    return tuple(
+        Verdict(cause, replace(worst, failed=failed & (number == place)))
+        for place, (_, cause) in enumerate(_CARRIER_CAUSES)
+    )
+
+
+def _channel_verdicts(found: CarrierAccelerationResult) -> tuple[Verdict, ...]:
+    """The worst statistic of each channel; one that is missing makes nobody fail, but is not ready."""
+    if not found.failed_channels.any():
+        return ()
+    worst = worst_of(_moved(found.channels, 2, 1), axes=2)
+    failed = found.failed_channels & (worst.statistic > worst.threshold)
+    return (Verdict(ExclusionCause.CARRIER_ACCELERATION, replace(worst, failed=failed)),)
+
+
+def _double_differences(
+    residual_m: FloatArray, channels: BoolArray, seen: Seen, settings: _Settings
+) -> DoubleDifferences:
+    """Of the channels given, over all baselines."""
+    params, elevation_rad = settings.gradient, seen.expected.elevation_rad
+    references = reference_satellites(seen.may_refer, elevation_rad, params.references)
+    used_m = np.where(channels[:, np.newaxis], residual_m[:, list(params.bands)], np.nan)
+    return double_differences(used_m, settings.site.baselines, references, elevation_rad, params.noise, params.bands)
+
+
+def _enough(channels: BoolArray, least: int) -> BoolArray:
+    """Channels of receivers that have enough of them in a constellation to be in use there, ``(R, N)``."""
+    number = channels.astype(np.int64) @ CLOCK_GROUPS.T.astype(np.int64)
+    return np.asarray((number >= least) @ CLOCK_GROUPS)
+
+
+def _fitting_differences(
+    residual_m: FloatArray, channels: BoolArray, seen: Seen, settings: _Settings, params: GroundParams
+) -> tuple[DoubleDifferences, MonitorResult]:
+    """Double differences to judge satellites by, and the receiver that is named by them.
+
+    When most satellites point to one receiver, theirs are those without it: they are judged at once as it will be from
+    now on. Otherwise the satellites bear it as if nothing were known of the receiver.
+    """
+    differences = _double_differences(residual_m, channels, seen, settings)
+    found = _shared_receiver(differences, seen, settings, params)
+    if not found.most:
+        return differences, found.receivers
+    kept = channels & ~found.receivers.failed[:, np.newaxis]
+    return _double_differences(residual_m, kept, seen, settings), found.receivers
+
+
+def _shared_receiver(
+    differences: DoubleDifferences, seen: Seen, settings: _Settings, params: GroundParams
+) -> SharedReceiver:
+    threshold_m = settings.site.k_ffd * differences.sigma_m
+    due = seen.due & (np.abs(differences.residual_m) > threshold_m).any(axis=(0, 1))
+    if not (due.any() and params.monitors.gradient.exclude):
+        count = len(seen.code_m)
+        least = np.full(count, float(params.receiver_fault_channels))
+        nobody = MonitorResult(statistic=np.zeros(count), threshold=least, failed=np.zeros(count, dtype=bool))
+        return SharedReceiver(receivers=nobody, most=False)
+    return shared_receiver(
+        differences,
+        threshold_m,
+        settings.site.baselines,
+        settings.planes,
+        seen.due,
+        seen.expected.elevation_rad,
+        seen.expected.azimuth_rad,
+        params.receiver_fault_channels,
+    )
+
+
+def _quiet_receivers(
+    residual_m: FloatArray, channels: BoolArray, seen: Seen, settings: _Settings, params: GroundParams
+) -> FloatArray:
+    """1 for receivers that would do on their baselines, 0 for those that would not, NaN where nobody can tell, (R,)."""
+    quiet = np.ones(len(seen.code_m))
+    baselines = settings.site.baselines
+    for receiver in np.flatnonzero(seen.suspended.any(axis=1)):
+        again = channels.copy()
+        again[receiver] |= seen.suspended[receiver]
+        differences = _double_differences(residual_m, again, seen, settings)
+        threshold_m = settings.site.k_ffd * differences.sigma_m
+        found = seen_quiet(differences, threshold_m, baselines, int(receiver), params.min_common_satellites)
+        quiet[receiver] = np.nan if found is None else float(found)
+    return quiet
+
+
+def _gradient(differences: DoubleDifferences, seen: Seen, settings: _Settings, *, exclude: bool) -> _Part:
+    site, params = settings.site, settings.gradient
+    found = check_ionosphere_gradient(differences, seen.due, site, params)
+    due = seen.due & (len(site.baselines) > 0)
+    return _Part(
+        looks={"gradient": look(found.verdict, due)},
+        details=_gradient_details(found, differences, settings),
+        satellites=_verdicts(exclude, (ExclusionCause.IONOSPHERE_GRADIENT, found.verdict), due),
+        ready=found.monitored if settings.gradient_required else None,
+    )
+
+
+def _ephemeris(
+    state: EphemerisResidualState, differences: DoubleDifferences, seen: Seen, settings: _Settings, *, exclude: bool
+) -> tuple[EphemerisResidualState, _Part, FloatArray]:
+    """Verdicts, and what an orbit that passes may be wrong by."""
+    baselines = settings.site.baselines
+    state, result = ephemeris_residual_step(
+        state, differences, baselines, seen.due, seen.dt_s, settings.ephemeris, shift_m=seen.shift_m
+    )
+    bound = orbit_bound(differences, seen.expected.elevation_rad, settings.orbit_site)
+    if not exclude:
+        bound = np.full(bound.shape, np.inf)
+    part = _Part(
+        looks={"ephemeris": look(result, seen.due & (len(baselines) > 0))},
+        satellites=_verdicts(exclude, (ExclusionCause.EPHEMERIS_RESIDUAL, result), seen.due),
+        ready=bound <= MAX_DECORRELATION if settings.orbit_required else None,
+    )
+    return state, part, bound
+
+
+def _power(
+    state: PowerExpectationState, seen: Seen, settings: _Settings, *, exclude: bool, required: bool
+) -> tuple[PowerExpectationState, _Part]:
+    """A receiver that gives no C/N0 fails where the station requires it, and is not looked at otherwise."""
+    given = np.isfinite(seen.cn0_dbhz[:, L1])
+    due = seen.ready & seen.due & (given | required)
+    state, found = power_expectation_step(
+        state, seen.cn0_dbhz, due, seen.expected.elevation_rad, seen.dt_s, settings.power
+    )
+    worst = worst_of(found.satellites, axes=1)
+    satellites = replace(worst, failed=np.logical_or.reduce(found.satellites.failed))
+    channels: tuple[Verdict, ...] = ()
+    if exclude and found.channels.failed.any():
+        channels = (Verdict(ExclusionCause.EXPECTED_POWER, worst_of(_moved(found.channels, 1, 0), axes=1)),)
+    return state, _Part(
+        looks={"expected_power": look(satellites, np.logical_or.reduce(due))},
+        satellites=_verdicts(exclude, (ExclusionCause.EXPECTED_POWER, satellites), seen.due),
+        channels=channels,
+    )
+
+
+def _gradient_details(found: GradientResult, differences: DoubleDifferences, settings: _Settings) -> dict[str, Any]:
+    details = {"gradient": found.gradient, "gradient_coverage": found.coverage}
+    baselines, bands = settings.site.baselines, settings.gradient.bands
+    places = [BASELINES.index((i + 1, j + 1)) for i, j in zip(baselines.first, baselines.second, strict=True)]
+    for name, band in (("double_difference_m", L1), ("double_difference_l5_m", L5)):
+        if band in bands:
+            details[name] = missing(len(BASELINES))
+            details[name][places] = differences.residual_m[:, bands.index(band)]
+    return details
+
+
+def _residual_m(seen: Seen, settings: _Settings) -> FloatArray:
+    """Carriers of all bands without what is expected of them, ``(R, N_BANDS, N)``."""
+    should = seen.expected
+    delay_m = settings.troposphere.delay_m(should.elevation_rad, should.azimuth_rad, settings.site.baselines.place_m)
+    return carrier_residual_m(seen.carrier_m, should.range_m, should.clock_s, delay_m, tuple(range(N_BANDS)))
+
+
+def _verdicts(exclude: bool, verdict: tuple[ExclusionCause, MonitorResult], due: BoolArray) -> tuple[Verdict, ...]:
+    """The failures of satellites that are due, unless the monitor is only watched."""
+    cause, result = verdict
+    return (Verdict(cause, replace(result, failed=result.failed & due)),) if exclude else ()
+
+
+def _moved(result: MonitorResult, source: int, destination: int) -> MonitorResult:
+    """The same with one axis elsewhere."""
+    shape = result.statistic.shape
+    return MonitorResult(
+        statistic=np.moveaxis(result.statistic, source, destination),
+        threshold=np.moveaxis(np.broadcast_to(result.threshold, shape), source, destination),
+        failed=np.moveaxis(np.broadcast_to(result.failed, shape), source, destination),
+    )
+
+
+def _row(result: MonitorResult, row: int) -> MonitorResult:
+    """One row of a result's first axis."""
+    threshold = np.broadcast_to(result.threshold, result.statistic.shape)
+    return MonitorResult(statistic=result.statistic[row], threshold=threshold[row], failed=result.failed[row])

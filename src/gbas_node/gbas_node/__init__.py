@@ -1,0 +1,1 @@
+"""What every node runs on: parameters, ports, start and end, diagnostics, flow control of drivers."""

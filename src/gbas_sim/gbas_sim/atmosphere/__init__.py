@@ -1,0 +1,1 @@
+"""Troposphere, ionosphere, fronts and scintillation."""

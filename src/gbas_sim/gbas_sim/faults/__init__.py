@@ -1,0 +1,1 @@
+"""Faults of satellites, signals and receivers."""

@@ -1,0 +1,1 @@
+"""Where the aircraft is: straight in, or by the equations of motion (``dynamics``)."""

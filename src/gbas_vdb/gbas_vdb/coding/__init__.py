@@ -1,0 +1,1 @@
+"""Bits: CRCs, forward error correction, scrambling and D8PSK symbols."""

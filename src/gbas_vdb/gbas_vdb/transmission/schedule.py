@@ -1,0 +1,445 @@
+"""The 0.5 s frame: which message blocks are sent, and in which slots.
+
+Type 1 (and 11) go out in every frame with every satellite; station data, approaches and predictions where there is
+room, at least once in 20 frames. A burst holds at most 222 bytes of application data and a block cannot be divided.
+
+Source: ICAO Annex 10 vol. I, App. B 3.6.3, 3.6.4 and table B-75; RTCA DO-246E (authentication).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Final
+
+from gbas_core.gnss.gpstime import modified_z_count_s
+from gbas_vdb.coding.fec import MAX_APPLICATION_BYTES, encode_fec
+from gbas_vdb.errors import ScheduleError
+from gbas_vdb.messages import tables
+from gbas_vdb.messages.block import CRC_BYTES, HEADER_BYTES, MAX_BLOCK_BYTES, encode_block, encode_body, wrap_body
+from gbas_vdb.messages.types import (
+    Correction30,
+    Correction100,
+    FasDataSet,
+    Type1,
+    Type2,
+    Type3,
+    Type4,
+    Type5,
+    Type11,
+    UnknownDataSet,
+)
+from gbas_vdb.transmission.burst import SLOT_NAMES, Burst
+from gbas_vdb.transmission.rotation import SourceHistory, choose_first
+
+_WRAPPER_BYTES: Final = HEADER_BYTES + CRC_BYTES
+_MAX_SOURCES: Final = 2 * tables.MAX_MEASUREMENTS
+_TYPE_BYTE: Final = 4
+_MAX_DATA_SETS_BYTES: Final = MAX_BLOCK_BYTES - _WRAPPER_BYTES
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScheduleParams:
+    """How a station broadcasts.
+
+    Attributes
+    ----------
+    station_id : str
+        GBAS identification.
+    slots : tuple of int
+        Assigned slots, 0 (A) to 7 (H), ascending; the station slot identifier is the first.
+    gast_d : bool
+        Send type 11 messages; every source then needs a `correction_30`.
+    test : bool
+        Mark every block as a test.
+    period_frames : int
+        Frames within which station data and every approach must be sent.
+    occupancy_min : float
+        Part of a burst's application data that must be filled when authentication (ADB4) is broadcast. Uncertain: 0.95
+        in published flight trials, 0.89 may be the value of the 2018 amendment.
+    """
+
+    station_id: str
+    slots: tuple[int, ...] = (0,)
+    gast_d: bool = False
+    test: bool = False
+    period_frames: int = 20
+    occupancy_min: float = 0.95
+
+    def __post_init__(self) -> None:
+        """Check the parameters.
+
+        Raises
+        ------
+        ValueError
+            Naming the parameter, its value and the bound.
+        """
+        tables.STATION_ID.to_raw(self.station_id)
+        if not self.slots or list(self.slots) != sorted(set(self.slots)) or not set(self.slots) <= set(range(8)):
+            raise ValueError(f"slots = {self.slots!r}: ascending numbers of 0 (A) to 7 (H) are wanted")
+        if not 1 <= self.period_frames <= 20:
+            raise ValueError(f"period_frames = {self.period_frames!r} outside 1 to 20")
+        if not 0.0 <= self.occupancy_min <= 1.0:
+            raise ValueError(f"occupancy_min = {self.occupancy_min!r} outside 0 to 1")
+
+    @property
+    def ssid(self) -> int:
+        """Station slot identifier: the first assigned slot."""
+        return self.slots[0]
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class SourceCorrection:
+    """All there is to broadcast of one ranging source in a frame.
+
+    Attributes
+    ----------
+    correction : Correction100
+    correction_30 : Correction30 or None
+        None where the station does not send type 11.
+    ephemeris_crc : int
+    ephemeris_decorrelation, ephemeris_decorrelation_d : float
+        P and P_D [m/m].
+    source_availability_s : float or None
+        None: not provided.
+    """
+
+    correction: Correction100
+    correction_30: Correction30 | None = None
+    ephemeris_crc: int
+    ephemeris_decorrelation: float
+    ephemeris_decorrelation_d: float = float("nan")
+    source_availability_s: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Frame:
+    """What a station has to say in one frame; the epoch of the corrections is the start of the frame."""
+
+    gps_week: int
+    tow_s: float
+    sources: tuple[SourceCorrection, ...]
+    station: Type2
+    approaches: tuple[FasDataSet | UnknownDataSet, ...] = ()
+    predictions: Type5 | None = None
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class ItemHistory:
+    """Last frame in which something periodic may next be sent, and whether it ever was."""
+
+    due: int
+    sent: bool
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class ScheduleState:
+    """What was sent and when; the initial state is ``ScheduleState()``.
+
+    Attributes
+    ----------
+    frame : int
+        Frames sent so far.
+    sources : mapping
+        History of each ranging source.
+    items : mapping of bytes to ItemHistory
+        History of station data, approaches and predictions, each by its bits.
+    """
+
+    frame: int = 0
+    sources: Mapping[int, SourceHistory] = field(default_factory=dict)
+    items: Mapping[bytes, ItemHistory] = field(default_factory=dict)
+
+
+@dataclass(kw_only=True)
+class _Slot:
+    """A burst being filled."""
+
+    number: int
+    blocks: list[bytes] = field(default_factory=list)
+    data_sets: list[bytes] = field(default_factory=list)
+
+    @property
+    def used(self) -> int:
+        approaches = sum(map(len, self.data_sets))
+        return sum(map(len, self.blocks)) + (approaches + _WRAPPER_BYTES if self.data_sets else 0)
+
+    def takes_block(self, n_bytes: int) -> bool:
+        return self.used + n_bytes <= MAX_APPLICATION_BYTES
+
+    def takes_data_set(self, n_bytes: int) -> bool:
+        if not self.data_sets:
+            return self.takes_block(n_bytes + _WRAPPER_BYTES)
+        return self.takes_block(n_bytes) and sum(map(len, self.data_sets)) + n_bytes <= _MAX_DATA_SETS_BYTES
+
+
+def schedule_frame(
+    state: ScheduleState, frame: Frame, params: ScheduleParams
+) -> tuple[ScheduleState, tuple[Burst, ...]]:
+    """The bursts of one frame.
+
+    Parameters
+    ----------
+    state : ScheduleState
+    frame : Frame
+    params : ScheduleParams
+
+    Returns
+    -------
+    state : ScheduleState
+    bursts : tuple of Burst
+        In the order of their slots; slots with nothing to say are silent.
+
+    Raises
+    ------
+    ScheduleError
+        When the blocks do not fit, naming bytes and slots.
+    FieldError
+        When a value cannot be sent, naming field, value and bound.
+
+    Examples
+    --------
+    >>> state, bursts = schedule_frame(state, Frame(gps_week=w, tow_s=t, sources=s, station=station), params)
+    >>> for block in decode_burst(bursts[0]).blocks:
+    ...     block.message
+    """
+    _check_authentication(frame.station, params)
+    corrections, sources = _correction_messages(state, frame, params)
+    slots = tuple(_Slot(number=number) for number in params.slots)
+    _place_corrections(slots, [encode_block(message, params.station_id, test=params.test) for message in corrections])
+    items = _place_periodic(slots, _periodic_items(frame, params), state, params)
+    bursts = _bursts(slots, frame, params)
+    return ScheduleState(frame=state.frame + 1, sources=sources, items=items), bursts
+
+
+def _check_authentication(station: Type2, params: ScheduleParams) -> None:
+    if station.adb4 is not None and station.adb4.slots != params.slots:
+        raise ScheduleError(
+            f"additional data block 4 names {_names(station.adb4.slots)}, but assigned are {_names(params.slots)}"
+        )
+
+
+def _names(slots: Sequence[int]) -> str:
+    return f"slot{'s' if len(slots) > 1 else ''} {', '.join(SLOT_NAMES[slot] for slot in slots)}"
+
+
+def _correction_messages(
+    state: ScheduleState, frame: Frame, params: ScheduleParams
+) -> tuple[list[Type1 | Type11], dict[int, SourceHistory]]:
+    by_source = {source.correction.ranging_source_id: source for source in frame.sources}
+    if len(by_source) != len(frame.sources):
+        raise ScheduleError("a ranging source is there twice")
+    if len(by_source) > _MAX_SOURCES:
+        raise ScheduleError(f"{len(by_source)} ranging sources; a linked pair of messages holds {_MAX_SOURCES}")
+    places = _places(len(by_source))
+    keys = {number: (source.correction.iod, source.ephemeris_crc) for number, source in by_source.items()}
+    first, history = choose_first(state.sources, keys, state.frame, places)
+    rest = [number for number in sorted(by_source) if number not in first]
+    sizes = _group_sizes(len(by_source), params.gast_d, params.slots)
+    z_count_s = modified_z_count_s(frame.tow_s)
+    messages: list[Type1 | Type11] = []
+    for place, size in enumerate(sizes):
+        order = [*first[place : place + 1], *rest[: max(size - 1, 0)]]
+        del rest[: max(size - 1, 0)]
+        group = tuple(by_source[number] for number in order)
+        flag = 0 if places == 1 else (1, 3)[place]
+        messages.append(_type1(group, z_count_s, flag))
+        if params.gast_d:
+            messages.append(_type11(group, z_count_s, flag))
+    return sorted(messages, key=lambda message: isinstance(message, Type11)), history
+
+
+def _type1(group: Sequence[SourceCorrection], z_count_s: float, flag: int) -> Type1:
+    measurements = tuple(source.correction for source in group)
+    if not group:
+        return Type1(modified_z_count_s=z_count_s, additional_message_flag=flag)
+    return Type1(
+        modified_z_count_s=z_count_s,
+        additional_message_flag=flag,
+        ephemeris_decorrelation=group[0].ephemeris_decorrelation,
+        ephemeris_crc=group[0].ephemeris_crc,
+        source_availability_s=group[0].source_availability_s,
+        measurements=measurements,
+    )
+
+
+def _type11(group: Sequence[SourceCorrection], z_count_s: float, flag: int) -> Type11:
+    measurements = []
+    for source in group:
+        if (
+            source.correction_30 is None
+            or source.correction_30.ranging_source_id != source.correction.ranging_source_id
+        ):
+            raise ScheduleError(
+                f"ranging source {source.correction.ranging_source_id} has no 30 s correction of its own"
+            )
+        measurements.append(source.correction_30)
+    return Type11(
+        modified_z_count_s=z_count_s,
+        additional_message_flag=flag,
+        ephemeris_decorrelation_d=group[0].ephemeris_decorrelation_d if group else float("nan"),
+        measurements=tuple(measurements),
+    )
+
+
+def _place_corrections(slots: Sequence[_Slot], blocks: Sequence[bytes]) -> None:
+    """First fit, longest first; what is placed first stays first in its burst."""
+    for block in sorted(blocks, key=len, reverse=True):
+        for slot in slots:
+            if slot.takes_block(len(block)):
+                slot.blocks.append(block)
+                break
+        else:
+            lengths = " + ".join(str(len(one)) for one in blocks)
+            raise ScheduleError(
+                f"the correction messages of a frame ({lengths} bytes) do not fit "
+                f"{_names([slot.number for slot in slots])} of {MAX_APPLICATION_BYTES} bytes each"
+            )
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class _Item:
+    """Something sent once in a while, by its bits."""
+
+    name: str
+    data: bytes
+    is_data_set: bool = False
+    required: bool = True
+
+
+@lru_cache(maxsize=256)
+def _encoded_block(message: Type2 | Type5, station_id: str, test: bool) -> bytes:
+    return encode_block(message, station_id, test=test)
+
+
+@lru_cache(maxsize=256)
+def _encoded_data_set(data_set: FasDataSet | UnknownDataSet) -> bytes:
+    return encode_body(Type4(data_sets=(data_set,)))
+
+
+def _periodic_items(frame: Frame, params: ScheduleParams) -> list[_Item]:
+    items = [_Item(name="station data", data=_encoded_block(frame.station, params.station_id, params.test))]
+    for position, data_set in enumerate(frame.approaches):
+        items.append(_Item(name=f"approach {position}", data=_encoded_data_set(data_set), is_data_set=True))
+    if frame.predictions is not None:
+        data = _encoded_block(frame.predictions, params.station_id, params.test)
+        items.append(_Item(name="predictions", data=data, required=False))
+    return items
+
+
+def _place_periodic(
+    slots: Sequence[_Slot], items: Sequence[_Item], state: ScheduleState, params: ScheduleParams
+) -> dict[bytes, ItemHistory]:
+    """Place what is new or in the second half of its period, the most urgent first."""
+    now, period = state.frame, params.period_frames
+    new = ItemHistory(due=now + period - 1, sent=False)
+    history = {item.data: state.items.get(item.data, new) for item in items}
+    for item in sorted(items, key=lambda one: history[one.data].due):
+        known = history[item.data]
+        if known.sent and now < known.due - period // 2:
+            continue
+        if _place_item(slots, item):
+            history[item.data] = ItemHistory(due=now + period, sent=True)
+        elif item.required and now >= known.due:
+            used = ", ".join(f"{SLOT_NAMES[slot.number]}: {slot.used}" for slot in slots)
+            raise ScheduleError(
+                f"{item.name} ({len(item.data)} bytes) found no room in {period} frames; "
+                f"bytes used of {MAX_APPLICATION_BYTES} in slot {used}"
+            )
+    return history
+
+
+def _place_item(slots: Sequence[_Slot], item: _Item) -> bool:
+    for slot in slots:
+        if item.is_data_set and slot.takes_data_set(len(item.data)):
+            slot.data_sets.append(item.data)
+            return True
+        if not item.is_data_set and slot.takes_block(len(item.data)):
+            slot.blocks.append(item.data)
+            return True
+    return False
+
+
+def _bursts(slots: Sequence[_Slot], frame: Frame, params: ScheduleParams) -> tuple[Burst, ...]:
+    authenticated = frame.station.adb4 is not None
+    filled: list[tuple[int, bytes]] = []
+    for slot in slots:
+        blocks = list(slot.blocks)
+        if slot.data_sets:
+            blocks.append(wrap_body(4, b"".join(slot.data_sets), params.station_id, test=params.test))
+        if authenticated:
+            blocks.sort(key=lambda block: block[_TYPE_BYTE] != 2)  # station data is first in its burst
+            blocks += _filler(sum(map(len, blocks)), params)
+        if blocks:
+            filled.append((slot.number, b"".join(blocks)))
+    return tuple(
+        Burst(
+            gps_week=frame.gps_week,
+            tow_s=frame.tow_s,
+            slot=number,
+            bursts_in_frame=len(filled),
+            payload=application_data + encode_fec(application_data),
+        )
+        for number, application_data in filled
+    )
+
+
+def _filler(used: int, params: ScheduleParams) -> list[bytes]:
+    """A null message, if the burst needs one to be as full as authentication asks for."""
+    wanted = math.ceil(params.occupancy_min * MAX_APPLICATION_BYTES)
+    if used >= wanted:
+        return []
+    n_fill_bytes = max(min(wanted, MAX_APPLICATION_BYTES) - used - _WRAPPER_BYTES, 0)
+    return [encode_block(Type3(n_fill_bytes=n_fill_bytes), params.station_id, test=params.test)]
+
+
+def sources_that_fit(station: Type2, approaches: Sequence[FasDataSet | UnknownDataSet], params: ScheduleParams) -> int:
+    """How many ranging sources a station can broadcast with its slots, and still send everything else in its turn."""
+    items = _periodic_items(
+        Frame(gps_week=0, tow_s=0.0, sources=(), station=station, approaches=tuple(approaches)), params
+    )
+    for n_sources in range(_MAX_SOURCES, -1, -1):
+        room = _room(
+            _correction_lengths(_group_sizes(n_sources, params.gast_d, params.slots), params.gast_d), params.slots
+        )
+        if all(len(item.data) + (_WRAPPER_BYTES if item.is_data_set else 0) <= room for item in items):
+            return n_sources
+    raise ScheduleError(
+        f"{_names(params.slots)} cannot hold the station's data: "
+        f"{', '.join(f'{item.name} {len(item.data)} bytes' for item in items)}"
+    )
+
+
+def _places(n_sources: int) -> int:
+    return 2 if n_sources > tables.MAX_MEASUREMENTS else 1
+
+
+def _correction_lengths(sizes: Sequence[int], gast_d: bool) -> list[int]:
+    lengths = [_WRAPPER_BYTES + 7 + 11 * size for size in sizes]
+    return lengths + ([_WRAPPER_BYTES + 4 + 7 * size for size in sizes] if gast_d else [])
+
+
+@lru_cache(maxsize=256)
+def _group_sizes(n_sources: int, gast_d: bool, slots: tuple[int, ...]) -> tuple[int, ...]:
+    """Satellites in each message of a linked pair: the division that leaves most room in one burst."""
+    if _places(n_sources) == 1:
+        return (n_sources,)
+    best, most_room = (-(-n_sources // 2), n_sources // 2), -1
+    for larger in range(best[0], tables.MAX_MEASUREMENTS + 1):
+        sizes = (larger, n_sources - larger)
+        room = _room(_correction_lengths(sizes, gast_d), slots)
+        if room > most_room:
+            best, most_room = sizes, room
+    return best
+
+
+def _room(lengths: Sequence[int], slots: Sequence[int]) -> int:
+    """Free bytes of the emptiest slot after the corrections are placed; -1 when they do not fit."""
+    filled = [_Slot(number=number) for number in slots]
+    try:
+        _place_corrections(filled, [bytes(length) for length in lengths])
+    except ScheduleError:
+        return -1
+    return MAX_APPLICATION_BYTES - min(slot.used for slot in filled)

@@ -1,0 +1,150 @@
+"""The station on recorded observations of real receivers; skipped where the data are not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from gbas_core.gnss.frames import geodetic_from_ecef
+from gbas_core.gnss.gpstime import epoch_key, from_epoch_key
+from gbas_core.io.recording import Recording
+from gbas_core.satellites import SAT_INDEX
+from gbas_ground.params import GroundParams
+from gbas_ground.station import GroundEpoch, GroundStation, initial_state
+from gbas_msgs_py.joining import ReceptionQueue
+from gbas_msgs_py.records import ChannelState
+from ground_runs import watching_monitors
+
+SETS = yaml.safe_load((Path(__file__).parents[1] / "tables" / "recorded_sets.yaml").read_text())
+GARR_M = (4796983.5094, 160309.1219, 4187340.3440)
+
+
+def station_at(positions_m, **changes):
+    latitude, longitude, height = (float(value) for value in geodetic_from_ecef(np.array(positions_m[0])))
+    chosen = {
+        "station_id": "TEST",
+        "latitude_rad": latitude,
+        "longitude_rad": longitude,
+        "height_m": height,
+        "receiver_ecef_m": tuple(tuple(each) for each in positions_m),
+        "min_receivers": min(2, len(positions_m)),
+        "require_cn0": False,
+        "slots": "AB",
+        "gcid": 1,
+    }
+    return GroundParams(**(chosen | changes))
+
+
+def run(recording, station, first=0, last=None):
+    """Integrity and events of a recording; ephemerides as received."""
+    state, queue = initial_state(station), ReceptionQueue()
+    for ephemeris in recording.ephemerides():
+        queue.add(epoch_key(ephemeris.gps_week, ephemeris.tow_s), ephemeris)
+    integrity, events = [], []
+    for recorded in recording.epochs(first=first, last=last):
+        week, tow_s = from_epoch_key(recorded.key)
+        epoch = GroundEpoch(
+            gps_week=week, tow_s=tow_s, observations=recorded.ground, ephemerides=queue.take(recorded.key)
+        )
+        state, monitored, _ = GroundStation.step(state, epoch, station)
+        each, told = monitored.integrity, monitored.events
+        integrity.append(each)
+        events.extend(told)
+    return integrity, events
+
+
+def stacked(integrity, name):
+    return np.array([getattr(each, name) for each in integrity])
+
+
+@pytest.fixture(scope="module")
+def upc(data_dir):
+    chosen = SETS["upc12_garr"]
+    recording = Recording.open(
+        [data_dir / name for name in chosen["ground"]], None, [data_dir / name for name in chosen["navigation"]]
+    )
+    first = int(recording.keys[0])
+    return run(recording, station_at(chosen["ground_xyz_m"]), last=first + 1_200_000)
+
+
+def test_two_receivers_38_m_apart_agree(upc):
+    """Differential corrections of two good receivers on one roof line differ by noise and multipath alone."""
+    integrity, events = upc
+    state = stacked(integrity, "state")
+    usable = state == ChannelState.USABLE
+    assert usable[231:].sum(axis=1).min() >= 7
+    assert not usable[:230].any()  # filters settle for 230 s
+    assert not [event for event in events if event.cause in ("b_value", "receiver_fault", "prc_limit", "rrc_limit")]
+
+    b = stacked(integrity, "b_m")
+    assert np.abs(np.nansum(b, axis=1)).max() < 1e-6  # of one satellite: zero but for rounding
+    sigma = stacked(integrity, "sigma_pr_gnd_m")
+    # Centred over satellites by the removal of the clocks (plain mean over the common set of all satellites used).
+    assert np.abs(np.nanmean(np.where(np.isfinite(sigma), b[:, 0], np.nan)[250:], axis=1)).max() < 0.1
+    # B / sigma_B stays well inside designator A, and is not suspiciously small: multipath of metres, smoothed.
+    normalised = (b[:, 0] / sigma)[usable]
+    assert 0.05 < normalised.std() < 1.0
+    assert np.abs(normalised).max() < 5.5
+
+
+def test_corrections_are_those_of_the_atmosphere(upc):
+    integrity, _ = upc
+    prc, elevation = stacked(integrity, "prc_100_m"), stacked(integrity, "elevation_rad")
+    usable = np.isfinite(prc)
+    # Troposphere 2.4 m and a quiet ionosphere some metres at the zenith, ten times that at 5 degrees, less the mean.
+    assert np.abs(prc[usable]).max() < 40.0
+    # A lower satellite has the longer delay, so the more negative correction.
+    order = [
+        np.corrcoef(p[u], 1.0 / np.sin(e[u]))[0, 1] for p, e, u in zip(prc, elevation, usable, strict=True) if u.any()
+    ]
+    assert np.mean(order) < -0.8
+    assert np.nanmax(np.abs(stacked(integrity, "rrc_100_mps"))) < 0.1
+
+
+def test_thirty_and_hundred_seconds_agree_on_a_quiet_day(upc):
+    integrity, _ = upc
+    difference = stacked(integrity, "prc_100_m") - stacked(integrity, "prc_30_m")
+    assert 0.01 < np.nanstd(difference) < 1.0
+
+
+@pytest.mark.parametrize("faulty", [True, False])
+def test_faulty_ephemeris_of_g17_never_comes_into_use(data_dir, faulty):
+    """One field of one ephemeris was changed: 2 km along the orbit. Received 18:00, it would be used from 18:02 on."""
+    folder = data_dir / "static_pair_L1L2_1h_2010"
+    recording = Recording.open(
+        [folder / "GARR0770.10o.gz"], None, [folder / ("brdc0770.10nERR.gz" if faulty else "brdc0770.10n.gz")]
+    )
+    midnight = int(recording.keys[0])
+    integrity, events = run(
+        recording,
+        station_at((GARR_M,), max_gap_s=45.0, monitors=watching_monitors()),  # a file of 30 s: too slow for them
+        first=midnight + 17 * 3_600_000,
+        last=midnight + 20 * 3_600_000,
+    )
+    told = [event for event in events if event.cause == "ephemeris_change" and event.subject == "G17"]
+    assert len(told) == int(faulty)
+    assert all(event.value > 1000.0 for event in told)
+    prc = stacked(integrity, "prc_100_m")
+    assert np.isfinite(prc[:, SAT_INDEX["G17"]]).sum() > 60
+    assert np.nanmax(np.abs(prc)) < 40.0
+
+
+@pytest.mark.parametrize("name", ["mosaic_base_rover", "spirent_static"])
+def test_gps_and_galileo(data_dir, name):
+    chosen = SETS[name]
+    recording = Recording.open(
+        [data_dir / path for path in chosen["ground"]], None, [data_dir / path for path in chosen["navigation"]]
+    )
+    station = station_at(chosen["ground_xyz_m"], systems="GE", require_cn0=True)
+    integrity, _ = run(recording, station, last=int(recording.keys[0]) + 260_000)
+    usable = stacked(integrity, "state") == ChannelState.USABLE
+    assert usable[-1, :32].sum() >= 6
+    assert usable[-1, 32:].sum() >= 6
+    assert np.isnan(stacked(integrity, "b_m")).all()  # one receiver
+    for constellation in (slice(0, 32), slice(32, 68)):
+        prc = stacked(integrity, "prc_100_m")[-1, constellation]
+        assert np.nansum(prc) == pytest.approx(0.0, abs=1e-6)  # a plain mean was removed
+        assert np.nanmax(np.abs(prc)) < 40.0
