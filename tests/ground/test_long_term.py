@@ -11,7 +11,7 @@ import pytest
 from gbas_core.satellites import N_SATS
 from gbas_ground.consistency import no_exclusions
 from gbas_ground.exclusions import Latch
-from gbas_ground.long_term import initial_long_term, watch_sigmas
+from gbas_ground.long_term import initial_long_term, monitor_sigmas
 from gbas_msgs_py.codes import ExclusionCause
 from ground_runs import params
 
@@ -48,7 +48,7 @@ def test_an_excluded_receiver_is_not_clear_while_its_estimates_are_remembered(si
     state = replace(bad_receiver(station), since_s=np.full((4, N_SATS), since_s))
     before = no_exclusions(station)
     before = replace(before, receivers=excluded(before.receivers, 1))
-    _, after, findings, _ = watch_sigmas(state, nothing_used(), before, 0.5, station)
+    _, after, findings, _ = monitor_sigmas(state, nothing_used(), before, 0.5, station)
     assert after.receivers.clear_s[1] == clear_s
     assert after.receivers.cause[1] == ExclusionCause.SIGMA_SPREAD
     assert not after.receivers.excluded[[0, 2, 3]].any()
@@ -59,7 +59,7 @@ def test_an_excluded_channel_likewise():
     station = params(4)
     before = no_exclusions(station)
     before = replace(before, channels=excluded(before.channels, (1, 3)))
-    _, after, findings, _ = watch_sigmas(bad_receiver(station), nothing_used(), before, 0.5, station)
+    _, after, findings, _ = monitor_sigmas(bad_receiver(station), nothing_used(), before, 0.5, station)
     assert after.channels.clear_s[1, 3] == 0.0
     assert after.channels.excluded.sum() == 1
     # the mean over the receiver, of which this channel is all there is to judge, fails as well

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gbas_airborne.navigation.guidance import approach_columns, guidance_columns
-from gbas_airborne.navigation.position import Attempt, Fix, PositionInputs, Speed, tested_position
+from gbas_airborne.navigation.position import Fix, PositionInputs, PositionResult, Speed, tested_position
 from gbas_airborne.params import AirborneParams
 from gbas_airborne.ranging.corrected_ranges import (
     RangingSources,
@@ -337,7 +337,7 @@ def _navigate(
     held = (sources.reason == int(Rejection.NONE)) & (state.held_until_s > now_s)
     if held.any():
         sources = replace(sources, reason=np.where(held, int(Rejection.RANGE_TEST), sources.reason))
-    attempt = Attempt(fix=None, reason=sources.reason)
+    attempt = PositionResult(fix=None, reason=sources.reason)
     if station is not None and corrections is not None:
         inputs = PositionInputs(sources=sources, corrections=corrections, station=station, approach=reception.approach)
         start = state.fix_ecef_m if state.fix_ecef_m is not None else station.reference_ecef_m
@@ -370,7 +370,7 @@ def _speed(state: PositionState, epoch: AirborneEpoch, params: AirborneParams) -
 
 def _report(
     before: NDArray[np.int64],
-    attempt: Attempt,
+    attempt: PositionResult,
     sources: RangingSources,
     reception: ReceptionState,
     params: AirborneParams,
@@ -389,7 +389,7 @@ def _report(
 def _evidence(
     index: int,
     reason: Rejection,
-    attempt: Attempt,
+    attempt: PositionResult,
     sources: RangingSources,
     reception: ReceptionState,
     params: AirborneParams,

@@ -17,7 +17,7 @@ from gbas_ground.corrections import formation as form
 from gbas_ground.corrections.sigma import Sigmas, broadcast_sigmas
 from gbas_ground.exclusions import Latch, exclude, initial_latch
 from gbas_ground.monitors.correction_limits import check_correction
-from gbas_ground.monitors.monitor_table import Look, look
+from gbas_ground.monitors.monitor_table import MonitorSummary, summarise
 from gbas_ground.monitors.multiple_reference import channel_sigma_m, check_b_values, check_unused
 from gbas_ground.monitors.result import MonitorResult
 from gbas_ground.params import GroundParams
@@ -25,7 +25,7 @@ from gbas_msgs_py.codes import ExclusionCause
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Measured:
+class CorrectionInputs:
     """What the corrections are formed from at one epoch.
 
     Attributes
@@ -120,21 +120,21 @@ class Finding:
     threshold: float
 
 
-def form_corrections(measured: Measured, exclusions: Exclusions, params: GroundParams) -> Corrections:
+def form_corrections(correction_inputs: CorrectionInputs, exclusions: Exclusions, params: GroundParams) -> Corrections:
     """Corrections from everything that is not excluded."""
-    usable = measured.ready & exclusions.usable_channels()
+    usable = correction_inputs.ready & exclusions.usable_channels()
     in_use, common = form.common_satellites(
         usable & ~exclusions.satellites.excluded,
         min_common=params.min_common_satellites,
         min_receivers=params.min_receivers,
     )
-    elevation = None if params.clock_weighting == "plain" else measured.elevation_rad
+    elevation = None if params.clock_weighting == "plain" else correction_inputs.elevation_rad
     weights = form.clock_weights(common, elevation)
-    adjusted = measured.correction_m - form.receiver_clock_m(measured.correction_m, weights)
+    adjusted = correction_inputs.correction_m - form.receiver_clock_m(correction_inputs.correction_m, weights)
     used = usable & in_use[0][:, np.newaxis] & CLOCK_GROUPS[0] | usable & in_use[1][:, np.newaxis] & CLOCK_GROUPS[1]
     used = used & np.isfinite(adjusted).all(axis=0)
     count = used.sum(axis=0).astype(np.float64)
-    sigmas = broadcast_sigmas(params, measured.elevation_rad, count)
+    sigmas = broadcast_sigmas(params, correction_inputs.elevation_rad, count)
     return Corrections(
         in_use=in_use,
         common=common,
@@ -142,48 +142,59 @@ def form_corrections(measured: Measured, exclusions: Exclusions, params: GroundP
         used=used,
         count=count,
         prc_m=form.average_m(adjusted, used),
-        rrc_mps=_rates(measured, used, weights, params),
+        rrc_mps=_rates(correction_inputs, used, weights, params),
         b_m=form.b_values_m(adjusted, used),
         sigmas=sigmas,
         channel_sigma_m=channel_sigma_m(np.stack([sigmas.gnd_d_m, sigmas.gnd_30_m]), count, weights),
     )
 
 
-def _rates(measured: Measured, used: BoolArray, weights: FloatArray, params: GroundParams) -> FloatArray:
+def _rates(
+    correction_inputs: CorrectionInputs, used: BoolArray, weights: FloatArray, params: GroundParams
+) -> FloatArray:
     """RRC from the channels that were there at the epoch before too, ``(tau, N)``."""
-    both = used & np.isfinite(measured.previous_m).all(axis=0)
+    both = used & np.isfinite(correction_inputs.previous_m).all(axis=0)
     if not np.array_equal(both, used):
         of_clock = both & (weights > 0.0).any(axis=0)
         _, common = form.common_satellites(of_clock, min_common=params.min_common_satellites, min_receivers=1)
-        weights = form.clock_weights(common, None if params.clock_weighting == "plain" else measured.elevation_rad)
-        both = both & np.isfinite(form.receiver_clock_m(measured.correction_m, weights)).all(axis=0)
-    return form.rate_mps(measured.correction_m, measured.previous_m, measured.dt_s, weights, both)
-
-
-def b_value_check(made: Corrections, params: GroundParams) -> MonitorResult:
-    """B values of both smoothing constants, ``(tau, R, N)``."""
-    return check_b_values(made.b_m, made.channel_sigma_m, made.used, params.k_b)
-
-
-def limit_checks(made: Corrections, params: GroundParams) -> tuple[tuple[ExclusionCause, MonitorResult], ...]:
-    """Sizes of PRC and, where there is one, RRC, ``(tau, N)`` each."""
-    has = made.count > 0
-    has_rate = has & np.isfinite(made.rrc_mps).all(axis=0)
-    return (
-        (ExclusionCause.PRC_LIMIT, check_correction(made.prc_m, has, params.max_prc_m)),
-        (ExclusionCause.RRC_LIMIT, check_correction(made.rrc_mps, has_rate, params.max_rrc_mps)),
+        weights = form.clock_weights(
+            common, None if params.clock_weighting == "plain" else correction_inputs.elevation_rad
+        )
+        both = both & np.isfinite(form.receiver_clock_m(correction_inputs.correction_m, weights)).all(axis=0)
+    return form.rate_mps(
+        correction_inputs.correction_m, correction_inputs.previous_m, correction_inputs.dt_s, weights, both
     )
 
 
-def consistency_looks(made: Corrections, params: GroundParams) -> dict[str, Look]:
+def b_value_check(corrections: Corrections, params: GroundParams) -> MonitorResult:
+    """B values of both smoothing constants, ``(tau, R, N)``."""
+    return check_b_values(corrections.b_m, corrections.channel_sigma_m, corrections.used, params.k_b)
+
+
+def limit_checks(corrections: Corrections, params: GroundParams) -> tuple[tuple[ExclusionCause, MonitorResult], ...]:
+    """Sizes of PRC and, where there is one, RRC, ``(tau, N)`` each."""
+    has = corrections.count > 0
+    has_rate = has & np.isfinite(corrections.rrc_mps).all(axis=0)
+    return (
+        (ExclusionCause.PRC_LIMIT, check_correction(corrections.prc_m, has, params.max_prc_m)),
+        (ExclusionCause.RRC_LIMIT, check_correction(corrections.rrc_mps, has_rate, params.max_rrc_mps)),
+    )
+
+
+def consistency_summaries(corrections: Corrections, params: GroundParams) -> dict[str, MonitorSummary]:
     """What the monitors of the corrections say of each satellite."""
-    has = made.count > 0
-    limits = {cause.word.removesuffix("_limit"): look(result, has) for cause, result in limit_checks(made, params)}
-    return {"b_value": look(b_value_check(made, params), made.used & (made.count >= 2)), **limits}
+    has = corrections.count > 0
+    limits = {
+        cause.word.removesuffix("_limit"): summarise(result, has) for cause, result in limit_checks(corrections, params)
+    }
+    return {
+        "b_value": summarise(b_value_check(corrections, params), corrections.used & (corrections.count >= 2)),
+        **limits,
+    }
 
 
-def agree(
-    measured: Measured, exclusions: Exclusions, params: GroundParams
+def resolve_consistency(
+    correction_inputs: CorrectionInputs, exclusions: Exclusions, params: GroundParams
 ) -> tuple[Corrections, Exclusions, tuple[Finding, ...]]:
     """Exclude what disagrees, one thing at a time, until the rest agrees.
 
@@ -197,10 +208,10 @@ def agree(
     """
     findings: list[Finding] = []
     while True:
-        made = form_corrections(measured, exclusions, params)
-        step = _worst_b_value(made, exclusions, params) or _worst_limit(made, exclusions, params)
+        corrections = form_corrections(correction_inputs, exclusions, params)
+        step = _worst_b_value(corrections, exclusions, params) or _worst_limit(corrections, exclusions, params)
         if step is None:
-            return made, exclusions, tuple(findings)
+            return corrections, exclusions, tuple(findings)
         exclusions, finding = step
         findings.append(finding)
 
@@ -214,18 +225,18 @@ def _ratio(result: MonitorResult) -> FloatArray:
     return np.where(np.isnan(ratio), np.inf, ratio)
 
 
-def _worst_b_value(made: Corrections, exclusions: Exclusions, params: GroundParams) -> _Step | None:
-    result = b_value_check(made, params)
+def _worst_b_value(corrections: Corrections, exclusions: Exclusions, params: GroundParams) -> _Step | None:
+    result = b_value_check(corrections, params)
     if not result.failed.any():
         return None
     # Two receivers do not tell which is wrong: then it is the satellite, once.
-    actionable = (made.count >= 3) | ~exclusions.satellites.excluded
+    actionable = (corrections.count >= 3) | ~exclusions.satellites.excluded
     ratio = np.where(actionable, _ratio(result), 0.0)
     tau, receiver, satellite = (int(place) for place in np.unravel_index(int(ratio.argmax()), ratio.shape))
     if ratio[tau, receiver, satellite] == 0.0:
         return None
     value, threshold = result.at(tau, receiver, satellite)
-    if made.count[satellite] < 3:
+    if corrections.count[satellite] < 3:
         failed = np.arange(ratio.shape[-1]) == satellite
         latch = exclude(exclusions.satellites, failed, ExclusionCause.B_VALUE)
         finding = Finding(subject=SAT_IDS[satellite], cause=ExclusionCause.B_VALUE, value=value, threshold=threshold)
@@ -248,9 +259,9 @@ def _worst_b_value(made: Corrections, exclusions: Exclusions, params: GroundPara
     return replace(exclusions, channels=channels), finding
 
 
-def _worst_limit(made: Corrections, exclusions: Exclusions, params: GroundParams) -> _Step | None:
+def _worst_limit(corrections: Corrections, exclusions: Exclusions, params: GroundParams) -> _Step | None:
     best: tuple[float, ExclusionCause, MonitorResult, tuple[int, ...]] | None = None
-    for cause, result in limit_checks(made, params):
+    for cause, result in limit_checks(corrections, params):
         if not result.failed.any():
             continue
         ratio = np.where(exclusions.satellites.excluded, 0.0, _ratio(result))
@@ -260,7 +271,7 @@ def _worst_limit(made: Corrections, exclusions: Exclusions, params: GroundParams
     if best is None:
         return None
     _, cause, result, (tau, satellite) = best
-    latch = exclude(exclusions.satellites, np.arange(made.count.shape[-1]) == satellite, cause)
+    latch = exclude(exclusions.satellites, np.arange(corrections.count.shape[-1]) == satellite, cause)
     value, threshold = result.at(tau, satellite)
     return replace(exclusions, satellites=latch), Finding(
         subject=SAT_IDS[satellite], cause=cause, value=value, threshold=threshold
@@ -268,7 +279,7 @@ def _worst_limit(made: Corrections, exclusions: Exclusions, params: GroundParams
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Standing:
+class ReadmissionState:
     """How what is excluded would do: masks of what was seen to pass, for :func:`gbas_ground.exclusions.advance`."""
 
     channels: BoolArray
@@ -276,21 +287,21 @@ class Standing:
     satellites: BoolArray
 
 
-def standing(
-    measured: Measured,
-    made: Corrections,
+def readmission_state(
+    correction_inputs: CorrectionInputs,
+    corrections: Corrections,
     exclusions: Exclusions,
     channel_ok: BoolArray,
     receivers_quiet: FloatArray,
     satellite_ok: BoolArray,
     params: GroundParams,
-) -> Standing:
+) -> ReadmissionState:
     """Judge what is not used against the corrections it has no part in.
 
     Parameters
     ----------
-    measured, made, exclusions
-        As they are after :func:`agree`.
+    correction_inputs, corrections, exclusions
+        As they are after :func:`resolve_consistency`.
     channel_ok : (R, N) bool array
         Channels that are tracked and pass the monitors of single channels.
     receivers_quiet : (R,) array
@@ -312,9 +323,11 @@ def standing(
     When the exclusions leave a constellation without a clock, nothing can be compared with anything, and no exclusion
     would ever end. Then everything is judged together as if nothing were excluded, and passes together or not at all.
     """
-    unused = measured.settled & ~made.used
-    result = check_unused(_residual_m(measured, made, params), made.channel_sigma_m, made.count, params.k_b)
-    judged = unused & np.isfinite(result.statistic).all(axis=0) & (made.count > 0)
+    unused = correction_inputs.settled & ~corrections.used
+    result = check_unused(
+        _residual_m(correction_inputs, corrections, params), corrections.channel_sigma_m, corrections.count, params.k_b
+    )
+    judged = unused & np.isfinite(result.statistic).all(axis=0) & (corrections.count > 0)
     near = result.statistic <= params.readmission_share * result.threshold
     agrees, disagrees = judged & near.all(axis=0), judged & result.failed.any(axis=0)
     needs_comparison = exclusions.channels.cause == ExclusionCause.B_VALUE
@@ -323,28 +336,34 @@ def standing(
     by_baselines = exclusions.receivers.cause == ExclusionCause.RECEIVER_BASELINES
     fits = (receivers_quiet == 1.0) | (np.isnan(receivers_quiet) & ~by_baselines)
 
-    seen = (made.count > 0) & np.isfinite(made.rrc_mps).all(axis=0)
-    within = ~np.asarray(np.any([result.failed.any(axis=0) for _, result in limit_checks(made, params)], axis=0))
-    consistent = ~b_value_check(made, params).failed.any(axis=(0, 1))
+    seen = (corrections.count > 0) & np.isfinite(corrections.rrc_mps).all(axis=0)
+    within = ~np.asarray(np.any([result.failed.any(axis=0) for _, result in limit_checks(corrections, params)], axis=0))
+    consistent = ~b_value_check(corrections, params).failed.any(axis=(0, 1))
     by_b = exclusions.satellites.cause == ExclusionCause.B_VALUE
-    satellites = satellite_ok & seen & within & consistent & (~by_b | (made.count >= 2))
+    satellites = satellite_ok & seen & within & consistent & (~by_b | (corrections.count >= 2))
 
-    together = _together(measured, made, channel_ok, params)
-    return Standing(
+    together = _together(correction_inputs, corrections, channel_ok, params)
+    return ReadmissionState(
         channels=channels | (channel_ok & together.channels),
         receivers=fits & (receivers | (together.receivers & ~disagrees.any(axis=1))),
         satellites=satellites | (satellite_ok & together.satellites),
     )
 
 
-def _together(measured: Measured, made: Corrections, channel_ok: BoolArray, params: GroundParams) -> Standing:
+def _together(
+    correction_inputs: CorrectionInputs, corrections: Corrections, channel_ok: BoolArray, params: GroundParams
+) -> ReadmissionState:
     """What passes in constellations without a clock when nothing is excluded there."""
     channels, receivers = np.zeros_like(channel_ok), np.zeros(len(channel_ok), dtype=bool)
     tracked = np.logical_or.reduce(channel_ok, axis=0)
-    stuck = ~np.logical_or.reduce(made.common, axis=1) & np.logical_or.reduce(tracked & CLOCK_GROUPS, axis=1)
+    stuck = ~np.logical_or.reduce(corrections.common, axis=1) & np.logical_or.reduce(tracked & CLOCK_GROUPS, axis=1)
     if stuck.any():
         # Monitors that average over receivers could judge nothing while all of these were excluded.
-        free = replace(measured, settled=measured.settled & channel_ok, judged=np.ones_like(measured.judged))
+        free = replace(
+            correction_inputs,
+            settled=correction_inputs.settled & channel_ok,
+            judged=np.ones_like(correction_inputs.judged),
+        )
         trial = form_corrections(free, no_exclusions(params), params)
         results = [b_value_check(trial, params).failed.any(axis=0), *(r.failed for _, r in limit_checks(trial, params))]
         failed = np.logical_or.reduce(np.concatenate(results), axis=0)
@@ -352,13 +371,13 @@ def _together(measured: Measured, made: Corrections, channel_ok: BoolArray, para
             if stuck[k] and trial.common[k].any() and not np.any(failed & group):
                 channels = channels | (trial.used & group)
                 receivers = receivers | trial.in_use[k]
-    return Standing(channels=channels, receivers=receivers, satellites=np.asarray(channels.any(axis=0)))
+    return ReadmissionState(channels=channels, receivers=receivers, satellites=np.asarray(channels.any(axis=0)))
 
 
-def _residual_m(measured: Measured, made: Corrections, params: GroundParams) -> FloatArray:
+def _residual_m(correction_inputs: CorrectionInputs, corrections: Corrections, params: GroundParams) -> FloatArray:
     """PR_sc less PRC, with each receiver's clock estimated against the PRC of the common satellites it has."""
-    against = measured.correction_m - made.prc_m[:, np.newaxis, :]
-    usable = measured.settled & np.isfinite(against).all(axis=0) & made.common.any(axis=0)
+    against = correction_inputs.correction_m - corrections.prc_m[:, np.newaxis, :]
+    usable = correction_inputs.settled & np.isfinite(against).all(axis=0) & corrections.common.any(axis=0)
     residual = np.full(against.shape, np.nan)
     for group in CLOCK_GROUPS:
         own = usable & group

@@ -15,7 +15,7 @@ from gbas_core.record import BoolArray
 from gbas_core.satellites import SAT_IDS
 from gbas_ground.consistency import Corrections, Exclusions, Finding
 from gbas_ground.exclusions import exclude
-from gbas_ground.monitors.monitor_table import Look, look, worst_of
+from gbas_ground.monitors.monitor_table import MonitorSummary, summarise, worst_of
 from gbas_ground.monitors.result import MonitorResult
 from gbas_ground.monitors.sigma_monitor import (
     SigmaMonitorParams,
@@ -39,9 +39,9 @@ def initial_long_term(params: GroundParams) -> SigmaMonitorState:
     return initial_sigma_monitor(params.n_receivers, _settings(params))
 
 
-def watch_sigmas(
-    state: SigmaMonitorState, made: Corrections, exclusions: Exclusions, dt_s: float, params: GroundParams
-) -> tuple[SigmaMonitorState, Exclusions, tuple[Finding, ...], dict[str, Look]]:
+def monitor_sigmas(
+    state: SigmaMonitorState, corrections: Corrections, exclusions: Exclusions, dt_s: float, params: GroundParams
+) -> tuple[SigmaMonitorState, Exclusions, tuple[Finding, ...], dict[str, MonitorSummary]]:
     """Take the B values of one epoch.
 
     Returns
@@ -50,19 +50,19 @@ def watch_sigmas(
     exclusions : Exclusions
         With the channels and receivers that fail, from the next epoch on.
     findings : tuple of Finding
-    looks : dict
+    summaries : dict
     """
-    settings, used = _settings(params), made.used & (made.count >= 2)
+    settings, used = _settings(params), corrections.used & (corrections.count >= 2)
     # What is excluded, alone or with its receiver, has no B values; its old estimates count until they are forgotten.
     remembered = (state.count > 0.0) & (state.since_s + max(dt_s, 0.0) <= settings.forget_s)
     due = used | (~exclusions.usable_channels() & remembered)
-    normalised = normalised_b(made.b_m, made.channel_sigma_m, used)
+    normalised = normalised_b(corrections.b_m, corrections.channel_sigma_m, used)
     state, result = sigma_monitor_step(state, normalised, due, dt_s, settings)
-    looks = {"sigma_mean": look(result.mean, used), "sigma_spread": look(result.variance, used)}
+    summaries = {"sigma_mean": summarise(result.mean, used), "sigma_spread": summarise(result.variance, used)}
     if not params.monitors.sigma.exclude:
-        return state, exclusions, (), looks
+        return state, exclusions, (), summaries
     exclusions, findings = _excluded(exclusions, result)
-    return state, exclusions, findings, looks
+    return state, exclusions, findings, summaries
 
 
 def _excluded(exclusions: Exclusions, result: SigmaMonitorResult) -> tuple[Exclusions, tuple[Finding, ...]]:

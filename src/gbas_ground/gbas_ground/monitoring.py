@@ -18,7 +18,7 @@ from gbas_core.ranging.divergence import DivergenceState
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import CLOCK_GROUPS, missing
 from gbas_core.signals import L1, L5, N_BANDS
-from gbas_ground.channels.predicted_ranges import Expected
+from gbas_ground.channels.predicted_ranges import PredictedRanges
 from gbas_ground.claims.orbit_claim import MAX_DECORRELATION, OrbitSite, orbit_bound
 from gbas_ground.monitors.carrier_acceleration import (
     CarrierAccelerationParams,
@@ -50,7 +50,7 @@ from gbas_ground.monitors.ionosphere_gradient import (
     check_ionosphere_gradient,
     gradient_site,
 )
-from gbas_ground.monitors.monitor_table import Look, look, place_of_worst, worst_of
+from gbas_ground.monitors.monitor_table import MonitorSummary, place_of_worst, summarise, worst_of
 from gbas_ground.monitors.power_expectation import (
     PowerExpectationParams,
     PowerExpectationState,
@@ -88,7 +88,7 @@ _GRADUAL: Final = frozenset(
 """Causes whose statistic is a size in noise; a share of its threshold means something."""
 
 
-class Seen(NamedTuple):
+class MonitorInputs(NamedTuple):
     """What monitors may look at, at one epoch.
 
     Attributes
@@ -109,7 +109,7 @@ class Seen(NamedTuple):
         Satellites that would be broadcast if nothing else were against it.
     may_refer : (N,) bool array
         Satellites others may be compared with.
-    expected : Expected
+    expected : PredictedRanges
     rebased : (N,) bool array
         Satellites whose ephemeris is another than at the epoch before.
     shift_m : (R, N) array
@@ -128,14 +128,14 @@ class Seen(NamedTuple):
     in_use: BoolArray
     due: BoolArray
     may_refer: BoolArray
-    expected: Expected
+    predicted: PredictedRanges
     rebased: BoolArray
     shift_m: FloatArray
     dt_s: float
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class WatchState:
+class MonitoringState:
     """What the monitors remember between epochs."""
 
     ccd: DivergenceState
@@ -152,12 +152,12 @@ class Verdict(NamedTuple):
     result: MonitorResult
 
 
-class _Part(NamedTuple):
+class _MonitorOutput(NamedTuple):
     """What one monitor has to say.
 
     Attributes
     ----------
-    looks : mapping from a monitor's name to Look
+    summaries : mapping from a monitor's name to MonitorSummary
     details : mapping from a field of :class:`MonitorEpoch` to its value
     satellites, channels : tuple of Verdict
         What follows from it; nothing from a monitor that is only watched.
@@ -165,7 +165,7 @@ class _Part(NamedTuple):
         Satellites it could judge, where that is required.
     """
 
-    looks: Mapping[str, Look]
+    summaries: Mapping[str, MonitorSummary]
     details: Mapping[str, Any] = {}
     satellites: tuple[Verdict, ...] = ()
     channels: tuple[Verdict, ...] = ()
@@ -173,7 +173,7 @@ class _Part(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Watched:
+class MonitoringResult:
     """What all monitors found at one epoch.
 
     Attributes
@@ -188,7 +188,7 @@ class Watched:
         Satellites that every required monitor could judge.
     orbit_bound : (N,) array
         P that the ephemeris monitor supports, :func:`~gbas_ground.claims.orbit_claim.orbit_bound` [m/m].
-    looks : mapping from a monitor's name to Look
+    summaries : mapping from a monitor's name to MonitorSummary
     details : mapping from a field of :class:`MonitorEpoch` to its value
     """
 
@@ -198,7 +198,7 @@ class Watched:
     receivers_quiet: FloatArray
     ready: BoolArray
     orbit_bound: FloatArray
-    looks: Mapping[str, Look]
+    summaries: Mapping[str, MonitorSummary]
     details: Mapping[str, Any]
 
     def passed(self, share: float) -> BoolArray:
@@ -254,10 +254,10 @@ def _settings(params: GroundParams) -> _Settings:
     )
 
 
-def initial_watch(params: GroundParams) -> WatchState:
+def initial_monitoring(params: GroundParams) -> MonitoringState:
     """Monitors that have seen nothing."""
     settings, count = _settings(params), params.n_receivers
-    return WatchState(
+    return MonitoringState(
         ccd=initial_ccd(settings.ccd, count),
         ccd_f=initial_two_frequency(settings.ccd_f, count),
         acceleration=initial_carrier_acceleration(count, settings.acceleration),
@@ -266,88 +266,97 @@ def initial_watch(params: GroundParams) -> WatchState:
     )
 
 
-def watch(state: WatchState, seen: Seen, params: GroundParams) -> tuple[WatchState, Watched]:
+def run_monitors(
+    state: MonitoringState, inputs: MonitorInputs, params: GroundParams
+) -> tuple[MonitoringState, MonitoringResult]:
     """Run every monitor over one epoch."""
     settings, sections = _settings(params), params.monitors
-    residual_m = _residual_m(seen, settings)
-    ccd, divergence = _ccd(state.ccd, seen, settings, exclude=sections.ccd.exclude)
-    ccd_f, two_frequency = _ccd_f(state.ccd_f, seen, settings, sections.ccd_f.exclude)
+    residual_m = _residual_m(inputs, settings)
+    ccd, divergence = _ccd(state.ccd, inputs, settings, exclude=sections.ccd.exclude)
+    ccd_f, two_frequency = _ccd_f(state.ccd_f, inputs, settings, sections.ccd_f.exclude)
     acceleration, carrier = _acceleration(
-        state.acceleration, residual_m, seen, settings, exclude=sections.acceleration.exclude
+        state.acceleration, residual_m, inputs, settings, exclude=sections.acceleration.exclude
     )
     # A channel that jumped alone must not make a gradient of its satellite, nor what is left of a receiver's channels.
-    steady = seen.ready & _enough(seen.ready, params.min_common_satellites)
+    steady = inputs.ready & _enough(inputs.ready, params.min_common_satellites)
     for verdict in carrier.channels:
         steady = steady & ~verdict.result.failed
-    differences, receivers = _fitting_differences(residual_m, steady, seen, settings, params)
-    gradient = _gradient(differences, seen, settings, exclude=sections.gradient.exclude)
+    differences, receivers = _fitting_differences(residual_m, steady, inputs, settings, params)
+    gradient = _gradient(differences, inputs, settings, exclude=sections.gradient.exclude)
     ephemeris, orbit, bound = _ephemeris(
-        state.ephemeris, differences, seen, settings, exclude=sections.ephemeris.exclude
+        state.ephemeris, differences, inputs, settings, exclude=sections.ephemeris.exclude
     )
     power, expectation = _power(
-        state.power, seen, settings, exclude=sections.expected_power.exclude, required=params.require_cn0
+        state.power, inputs, settings, exclude=sections.expected_power.exclude, required=params.require_cn0
     )
-    parts = (_common_slip(seen), divergence, two_frequency, carrier, gradient, orbit, expectation)
-    ready = np.ones_like(seen.due)
+    parts = (_common_slip(inputs), divergence, two_frequency, carrier, gradient, orbit, expectation)
+    ready = np.ones_like(inputs.due)
     for part in parts:
         if part.ready is not None:
             ready = ready & part.ready
-    watched = Watched(
+    result = MonitoringResult(
         satellites=tuple(verdict for part in parts for verdict in part.satellites),
         channels=tuple(verdict for part in parts for verdict in part.channels),
         receivers=receivers,
-        receivers_quiet=_quiet_receivers(residual_m, steady, seen, settings, params),
+        receivers_quiet=_quiet_receivers(residual_m, steady, inputs, settings, params),
         ready=ready,
         orbit_bound=bound,
-        looks={name: each for part in parts for name, each in part.looks.items()},
+        summaries={name: each for part in parts for name, each in part.summaries.items()},
         details={name: each for part in parts for name, each in part.details.items()},
     )
-    state = WatchState(ccd=ccd, ccd_f=ccd_f, acceleration=acceleration, ephemeris=ephemeris, power=power)
-    return state, watched
+    state = MonitoringState(ccd=ccd, ccd_f=ccd_f, acceleration=acceleration, ephemeris=ephemeris, power=power)
+    return state, result
 
 
-def _common_slip(seen: Seen) -> _Part:
+def _common_slip(inputs: MonitorInputs) -> _MonitorOutput:
     """A satellite that steps has no settled filters any more, so `due` does not have it."""
-    tracked = np.isfinite(seen.code_m[:, L1] + seen.carrier_m[:, L1])
-    result = check_common_slip(seen.slipped[:, L1], tracked, seen.in_use)
-    return _Part(
-        looks={"common_slip": look(result, seen.in_use)}, satellites=(Verdict(ExclusionCause.COMMON_SLIP, result),)
+    tracked = np.isfinite(inputs.code_m[:, L1] + inputs.carrier_m[:, L1])
+    result = check_common_slip(inputs.slipped[:, L1], tracked, inputs.in_use)
+    return _MonitorOutput(
+        summaries={"common_slip": summarise(result, inputs.in_use)},
+        satellites=(Verdict(ExclusionCause.COMMON_SLIP, result),),
     )
 
 
-def _ccd(state: DivergenceState, seen: Seen, settings: _Settings, *, exclude: bool) -> tuple[DivergenceState, _Part]:
-    state, epoch = ccd_step(state, seen.code_m, seen.carrier_m, seen.slipped, seen.ready, seen.dt_s, settings.ccd)
+def _ccd(
+    state: DivergenceState, inputs: MonitorInputs, settings: _Settings, *, exclude: bool
+) -> tuple[DivergenceState, _MonitorOutput]:
+    state, epoch = ccd_step(
+        state, inputs.code_m, inputs.carrier_m, inputs.slipped, inputs.ready, inputs.dt_s, settings.ccd
+    )
     result = _row(epoch.satellites, L1)
     by_receiver = missing(MAX_REFERENCE_RECEIVERS)
     by_receiver[: len(epoch.receiver_mps)] = epoch.receiver_mps[:, L1]
-    return state, _Part(
-        looks={"ccd": look(result, seen.due)},
+    return state, _MonitorOutput(
+        summaries={"ccd": summarise(result, inputs.due)},
         details={"ccd_receiver_mps": by_receiver},
-        satellites=_verdicts(exclude, (ExclusionCause.CODE_CARRIER_DIVERGENCE, result), seen.due),
+        satellites=_verdicts(exclude, (ExclusionCause.CODE_CARRIER_DIVERGENCE, result), inputs.due),
         ready=epoch.receivers[L1] > 0 if exclude else None,
     )
 
 
-def _ccd_f(state: TwoFrequencyState, seen: Seen, settings: _Settings, exclude: str) -> tuple[TwoFrequencyState, _Part]:
+def _ccd_f(
+    state: TwoFrequencyState, inputs: MonitorInputs, settings: _Settings, exclude: str
+) -> tuple[TwoFrequencyState, _MonitorOutput]:
     """Where a satellite has no second band there is nothing to judge: the single-band monitor has it."""
     params = settings.ccd_f
     given = TwoFrequencyInput(
-        code_m=seen.code_m,
-        carrier_m=seen.carrier_m,
-        restarted=seen.slipped,
-        range_m=seen.expected.range_m,
-        clock_s=seen.expected.clock_s,
-        rebased=seen.rebased,
-        elevation_rad=seen.expected.elevation_rad,
-        used=seen.ready,
-        clock_used=seen.usable,
+        code_m=inputs.code_m,
+        carrier_m=inputs.carrier_m,
+        restarted=inputs.slipped,
+        range_m=inputs.predicted.range_m,
+        clock_s=inputs.predicted.clock_s,
+        rebased=inputs.rebased,
+        elevation_rad=inputs.predicted.elevation_rad,
+        used=inputs.ready,
+        clock_used=inputs.usable,
     )
-    state, epoch = two_frequency_step(state, given, seen.dt_s, params)
+    state, epoch = two_frequency_step(state, given, inputs.dt_s, params)
     forms = {"sound": epoch.sound, "paper": epoch.paper}
-    due = seen.due & (epoch.receivers > 0)
+    due = inputs.due & (epoch.receivers > 0)
     chosen = forms.get(exclude)
-    return state, _Part(
-        looks={"ccd_f": look(epoch.sound, due), "ccd_f_paper": look(epoch.paper, due)},
+    return state, _MonitorOutput(
+        summaries={"ccd_f": summarise(epoch.sound, due), "ccd_f_paper": summarise(epoch.paper, due)},
         details={"divergence_mps": epoch.mean_mps, **_likeliest_mode(epoch, due, params)},
         satellites=() if chosen is None else _verdicts(True, (ExclusionCause.TWO_FREQUENCY_DIVERGENCE, chosen), due),
     )
@@ -367,25 +376,30 @@ def _likeliest_mode(epoch: TwoFrequencyEpoch, due: BoolArray, params: TwoFrequen
 
 
 def _acceleration(
-    state: CarrierAccelerationState, residual_m: FloatArray, seen: Seen, settings: _Settings, *, exclude: bool
-) -> tuple[CarrierAccelerationState, _Part]:
+    state: CarrierAccelerationState,
+    residual_m: FloatArray,
+    inputs: MonitorInputs,
+    settings: _Settings,
+    *,
+    exclude: bool,
+) -> tuple[CarrierAccelerationState, _MonitorOutput]:
     params = settings.acceleration
     state, found = carrier_acceleration_step(
         state,
         residual_m[:, list(params.bands)],
-        seen.slipped[:, list(params.bands)],
-        seen.ready & seen.due,
-        seen.expected.elevation_rad,
-        seen.dt_s,
+        inputs.slipped[:, list(params.bands)],
+        inputs.ready & inputs.due,
+        inputs.predicted.elevation_rad,
+        inputs.dt_s,
         params,
-        shift_m=seen.shift_m,
+        shift_m=inputs.shift_m,
     )
     known = np.isfinite(found.satellites.statistic[0, 0])
     each = [_row(found.satellites, number) for number in range(len(_CARRIER_CAUSES))]
-    looks = {name: look(result, seen.due) for (name, _), result in zip(_CARRIER_CAUSES, each, strict=True)}
-    return state, _Part(
-        looks=looks,
-        satellites=_carrier_verdicts(found, seen.due & known) if exclude else (),
+    summaries = {name: summarise(result, inputs.due) for (name, _), result in zip(_CARRIER_CAUSES, each, strict=True)}
+    return state, _MonitorOutput(
+        summaries=summaries,
+        satellites=_carrier_verdicts(found, inputs.due & known) if exclude else (),
         channels=_channel_verdicts(found) if exclude else (),
         ready=known if exclude else None,
     )
@@ -414,11 +428,11 @@ def _channel_verdicts(found: CarrierAccelerationResult) -> tuple[Verdict, ...]:
 
 
 def _double_differences(
-    residual_m: FloatArray, channels: BoolArray, seen: Seen, settings: _Settings
+    residual_m: FloatArray, channels: BoolArray, inputs: MonitorInputs, settings: _Settings
 ) -> DoubleDifferences:
     """Of the channels given, over all baselines."""
-    params, elevation_rad = settings.gradient, seen.expected.elevation_rad
-    references = reference_satellites(seen.may_refer, elevation_rad, params.references)
+    params, elevation_rad = settings.gradient, inputs.predicted.elevation_rad
+    references = reference_satellites(inputs.may_refer, elevation_rad, params.references)
     used_m = np.where(channels[:, np.newaxis], residual_m[:, list(params.bands)], np.nan)
     return double_differences(used_m, settings.site.baselines, references, elevation_rad, params.noise, params.bands)
 
@@ -430,28 +444,28 @@ def _enough(channels: BoolArray, least: int) -> BoolArray:
 
 
 def _fitting_differences(
-    residual_m: FloatArray, channels: BoolArray, seen: Seen, settings: _Settings, params: GroundParams
+    residual_m: FloatArray, channels: BoolArray, inputs: MonitorInputs, settings: _Settings, params: GroundParams
 ) -> tuple[DoubleDifferences, MonitorResult]:
     """Double differences to judge satellites by, and the receiver that is named by them.
 
     When most satellites point to one receiver, theirs are those without it: they are judged at once as it will be from
     now on. Otherwise the satellites bear it as if nothing were known of the receiver.
     """
-    differences = _double_differences(residual_m, channels, seen, settings)
-    found = _shared_receiver(differences, seen, settings, params)
+    differences = _double_differences(residual_m, channels, inputs, settings)
+    found = _shared_receiver(differences, inputs, settings, params)
     if not found.most:
         return differences, found.receivers
     kept = channels & ~found.receivers.failed[:, np.newaxis]
-    return _double_differences(residual_m, kept, seen, settings), found.receivers
+    return _double_differences(residual_m, kept, inputs, settings), found.receivers
 
 
 def _shared_receiver(
-    differences: DoubleDifferences, seen: Seen, settings: _Settings, params: GroundParams
+    differences: DoubleDifferences, inputs: MonitorInputs, settings: _Settings, params: GroundParams
 ) -> SharedReceiver:
     threshold_m = settings.site.k_ffd * differences.sigma_m
-    due = seen.due & (np.abs(differences.residual_m) > threshold_m).any(axis=(0, 1))
+    due = inputs.due & (np.abs(differences.residual_m) > threshold_m).any(axis=(0, 1))
     if not (due.any() and params.monitors.gradient.exclude):
-        count = len(seen.code_m)
+        count = len(inputs.code_m)
         least = np.full(count, float(params.receiver_fault_channels))
         nobody = MonitorResult(statistic=np.zeros(count), threshold=least, failed=np.zeros(count, dtype=bool))
         return SharedReceiver(receivers=nobody, most=False)
@@ -460,35 +474,37 @@ def _shared_receiver(
         threshold_m,
         settings.site.baselines,
         settings.planes,
-        seen.due,
-        seen.expected.elevation_rad,
-        seen.expected.azimuth_rad,
+        inputs.due,
+        inputs.predicted.elevation_rad,
+        inputs.predicted.azimuth_rad,
         params.receiver_fault_channels,
     )
 
 
 def _quiet_receivers(
-    residual_m: FloatArray, channels: BoolArray, seen: Seen, settings: _Settings, params: GroundParams
+    residual_m: FloatArray, channels: BoolArray, inputs: MonitorInputs, settings: _Settings, params: GroundParams
 ) -> FloatArray:
     """1 for receivers that would do on their baselines, 0 for those that would not, NaN where nobody can tell, (R,)."""
-    quiet = np.ones(len(seen.code_m))
+    quiet = np.ones(len(inputs.code_m))
     baselines = settings.site.baselines
-    for receiver in np.flatnonzero(seen.suspended.any(axis=1)):
+    for receiver in np.flatnonzero(inputs.suspended.any(axis=1)):
         again = channels.copy()
-        again[receiver] |= seen.suspended[receiver]
-        differences = _double_differences(residual_m, again, seen, settings)
+        again[receiver] |= inputs.suspended[receiver]
+        differences = _double_differences(residual_m, again, inputs, settings)
         threshold_m = settings.site.k_ffd * differences.sigma_m
         found = seen_quiet(differences, threshold_m, baselines, int(receiver), params.min_common_satellites)
         quiet[receiver] = np.nan if found is None else float(found)
     return quiet
 
 
-def _gradient(differences: DoubleDifferences, seen: Seen, settings: _Settings, *, exclude: bool) -> _Part:
+def _gradient(
+    differences: DoubleDifferences, inputs: MonitorInputs, settings: _Settings, *, exclude: bool
+) -> _MonitorOutput:
     site, params = settings.site, settings.gradient
-    found = check_ionosphere_gradient(differences, seen.due, site, params)
-    due = seen.due & (len(site.baselines) > 0)
-    return _Part(
-        looks={"gradient": look(found.verdict, due)},
+    found = check_ionosphere_gradient(differences, inputs.due, site, params)
+    due = inputs.due & (len(site.baselines) > 0)
+    return _MonitorOutput(
+        summaries={"gradient": summarise(found.verdict, due)},
         details=_gradient_details(found, differences, settings),
         satellites=_verdicts(exclude, (ExclusionCause.IONOSPHERE_GRADIENT, found.verdict), due),
         ready=found.monitored if settings.gradient_required else None,
@@ -496,41 +512,46 @@ def _gradient(differences: DoubleDifferences, seen: Seen, settings: _Settings, *
 
 
 def _ephemeris(
-    state: EphemerisResidualState, differences: DoubleDifferences, seen: Seen, settings: _Settings, *, exclude: bool
-) -> tuple[EphemerisResidualState, _Part, FloatArray]:
+    state: EphemerisResidualState,
+    differences: DoubleDifferences,
+    inputs: MonitorInputs,
+    settings: _Settings,
+    *,
+    exclude: bool,
+) -> tuple[EphemerisResidualState, _MonitorOutput, FloatArray]:
     """Verdicts, and what an orbit that passes may be wrong by."""
     baselines = settings.site.baselines
     state, result = ephemeris_residual_step(
-        state, differences, baselines, seen.due, seen.dt_s, settings.ephemeris, shift_m=seen.shift_m
+        state, differences, baselines, inputs.due, inputs.dt_s, settings.ephemeris, shift_m=inputs.shift_m
     )
-    bound = orbit_bound(differences, seen.expected.elevation_rad, settings.orbit_site)
+    bound = orbit_bound(differences, inputs.predicted.elevation_rad, settings.orbit_site)
     if not exclude:
         bound = np.full(bound.shape, np.inf)
-    part = _Part(
-        looks={"ephemeris": look(result, seen.due & (len(baselines) > 0))},
-        satellites=_verdicts(exclude, (ExclusionCause.EPHEMERIS_RESIDUAL, result), seen.due),
+    part = _MonitorOutput(
+        summaries={"ephemeris": summarise(result, inputs.due & (len(baselines) > 0))},
+        satellites=_verdicts(exclude, (ExclusionCause.EPHEMERIS_RESIDUAL, result), inputs.due),
         ready=bound <= MAX_DECORRELATION if settings.orbit_required else None,
     )
     return state, part, bound
 
 
 def _power(
-    state: PowerExpectationState, seen: Seen, settings: _Settings, *, exclude: bool, required: bool
-) -> tuple[PowerExpectationState, _Part]:
+    state: PowerExpectationState, inputs: MonitorInputs, settings: _Settings, *, exclude: bool, required: bool
+) -> tuple[PowerExpectationState, _MonitorOutput]:
     """A receiver that gives no C/N0 fails where the station requires it, and is not looked at otherwise."""
-    given = np.isfinite(seen.cn0_dbhz[:, L1])
-    due = seen.ready & seen.due & (given | required)
+    given = np.isfinite(inputs.cn0_dbhz[:, L1])
+    due = inputs.ready & inputs.due & (given | required)
     state, found = power_expectation_step(
-        state, seen.cn0_dbhz, due, seen.expected.elevation_rad, seen.dt_s, settings.power
+        state, inputs.cn0_dbhz, due, inputs.predicted.elevation_rad, inputs.dt_s, settings.power
     )
     worst = worst_of(found.satellites, axes=1)
     satellites = replace(worst, failed=np.logical_or.reduce(found.satellites.failed))
     channels: tuple[Verdict, ...] = ()
     if exclude and found.channels.failed.any():
         channels = (Verdict(ExclusionCause.EXPECTED_POWER, worst_of(_moved(found.channels, 1, 0), axes=1)),)
-    return state, _Part(
-        looks={"expected_power": look(satellites, np.logical_or.reduce(due))},
-        satellites=_verdicts(exclude, (ExclusionCause.EXPECTED_POWER, satellites), seen.due),
+    return state, _MonitorOutput(
+        summaries={"expected_power": summarise(satellites, np.logical_or.reduce(due))},
+        satellites=_verdicts(exclude, (ExclusionCause.EXPECTED_POWER, satellites), inputs.due),
         channels=channels,
     )
 
@@ -546,11 +567,13 @@ def _gradient_details(found: GradientResult, differences: DoubleDifferences, set
     return details
 
 
-def _residual_m(seen: Seen, settings: _Settings) -> FloatArray:
+def _residual_m(inputs: MonitorInputs, settings: _Settings) -> FloatArray:
     """Carriers of all bands without what is expected of them, ``(R, N_BANDS, N)``."""
-    should = seen.expected
-    delay_m = settings.troposphere.delay_m(should.elevation_rad, should.azimuth_rad, settings.site.baselines.place_m)
-    return carrier_residual_m(seen.carrier_m, should.range_m, should.clock_s, delay_m, tuple(range(N_BANDS)))
+    predicted = inputs.predicted
+    delay_m = settings.troposphere.delay_m(
+        predicted.elevation_rad, predicted.azimuth_rad, settings.site.baselines.place_m
+    )
+    return carrier_residual_m(inputs.carrier_m, predicted.range_m, predicted.clock_s, delay_m, tuple(range(N_BANDS)))
 
 
 def _verdicts(exclude: bool, verdict: tuple[ExclusionCause, MonitorResult], due: BoolArray) -> tuple[Verdict, ...]:

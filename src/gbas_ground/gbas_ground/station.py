@@ -25,23 +25,23 @@ from gbas_ground.broadcast import (
 )
 from gbas_ground.channels import ephemerides
 from gbas_ground.channels.ephemerides import EphemerisState, initial_ephemerides
-from gbas_ground.channels.predicted_ranges import Expected, Site, expected, site_of
+from gbas_ground.channels.predicted_ranges import PredictedRanges, Site, predict_ranges, site_of
 from gbas_ground.channels.tracking import RawEpoch, TrackGroup, Tracks, initial_tracking, stack, track
 from gbas_ground.consistency import (
+    CorrectionInputs,
     Corrections,
     Exclusions,
     Finding,
-    Measured,
-    agree,
-    consistency_looks,
+    consistency_summaries,
     no_exclusions,
-    standing,
+    readmission_state,
+    resolve_consistency,
 )
 from gbas_ground.corrections.formation import range_correction_m
 from gbas_ground.exclusions import advance, exclude, release
 from gbas_ground.executive.channel_table import channel_epoch
 from gbas_ground.executive.event_log import EventLog
-from gbas_ground.executive.satellite_status import Condition, conclude, integrity_of, withheld
+from gbas_ground.executive.satellite_status import SatelliteStatus, integrity_of, satellite_status, withheld
 from gbas_ground.ionosphere.position_errors import compile_ahead
 from gbas_ground.ionosphere.protection import (
     IonosphereState,
@@ -51,10 +51,10 @@ from gbas_ground.ionosphere.protection import (
     initial_ionosphere,
     protect,
 )
-from gbas_ground.long_term import initial_long_term, watch_sigmas
-from gbas_ground.monitoring import Seen, Watched, WatchState, initial_watch, watch
+from gbas_ground.long_term import initial_long_term, monitor_sigmas
+from gbas_ground.monitoring import MonitoringResult, MonitoringState, MonitorInputs, initial_monitoring, run_monitors
 from gbas_ground.monitors.expected_range import check_expected_range
-from gbas_ground.monitors.monitor_table import look, monitor_epoch
+from gbas_ground.monitors.monitor_table import monitor_epoch, summarise
 from gbas_ground.monitors.result import MonitorResult
 from gbas_ground.monitors.sigma_monitor import SigmaMonitorState
 from gbas_ground.monitors.signal_power import check_signal_power
@@ -109,7 +109,7 @@ class Monitored:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Before:
+class PreviousEpoch:
     """What the range rate corrections and the slip tests need of the epoch before.
 
     Attributes
@@ -130,7 +130,7 @@ class Before:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class MonitorState:
+class IntegrityState:
     """What the station remembers between epochs; from :func:`initial_monitor_state`.
 
     Attributes
@@ -142,7 +142,7 @@ class MonitorState:
     ephemerides : EphemerisState
     tracking : tuple of TrackGroup
     exclusions : Exclusions
-    before : Before or None
+    previous : PreviousEpoch or None
     satellites : (N,) array
         :class:`ChannelState` of each satellite at the last epoch.
     causes : (N,) array
@@ -155,7 +155,7 @@ class MonitorState:
         Whether there were corrections at the last epoch.
     channels : ChannelEpoch or None
         The executive's table of the last epoch.
-    watching : WatchState
+    monitoring : MonitoringState
         Monitors of signals.
     long_term : SigmaMonitorState
         Monitor of B values over time.
@@ -169,37 +169,37 @@ class MonitorState:
     ephemerides: EphemerisState
     tracking: tuple[TrackGroup, ...]
     exclusions: Exclusions
-    before: Before | None
+    previous: PreviousEpoch | None
     satellites: FloatArray
     causes: FloatArray
     present: BoolArray
     contributing: BoolArray
     serving: bool
     channels: ChannelEpoch | None
-    watching: WatchState
+    monitoring: MonitoringState
     long_term: SigmaMonitorState
     ionosphere: IonosphereState
 
 
-def initial_monitor_state(params: GroundParams) -> MonitorState:
+def initial_monitor_state(params: GroundParams) -> IntegrityState:
     """A station that has seen nothing."""
     if params.ionosphere.protects:
         compile_ahead()
-    return MonitorState(
+    return IntegrityState(
         key=None,
         refused=0,
         refused_key=0,
         ephemerides=initial_ephemerides(),
         tracking=initial_tracking(params),
         exclusions=no_exclusions(params),
-        before=None,
+        previous=None,
         satellites=np.full(N_SATS, float(ChannelState.NOT_TRACKED)),
         causes=np.zeros(N_SATS),
         present=np.ones(params.n_receivers, dtype=bool),
         contributing=np.zeros(params.n_receivers, dtype=bool),
         serving=False,
         channels=None,
-        watching=initial_watch(params),
+        monitoring=initial_monitoring(params),
         long_term=initial_long_term(params),
         ionosphere=initial_ionosphere(),
     )
@@ -209,7 +209,7 @@ def initial_monitor_state(params: GroundParams) -> MonitorState:
 class StationState:
     """State of the whole station."""
 
-    monitor: MonitorState
+    monitor: IntegrityState
     broadcast: BroadcastState
 
 
@@ -227,12 +227,12 @@ class GroundStation:
     """The station's steps; it holds nothing itself. Nodes, the offline command and studies all use these."""
 
     @staticmethod
-    def monitor(state: MonitorState, epoch: GroundEpoch, params: GroundParams) -> tuple[MonitorState, Monitored]:
+    def monitor(state: IntegrityState, epoch: GroundEpoch, params: GroundParams) -> tuple[IntegrityState, Monitored]:
         """Corrections of one epoch after monitoring.
 
         Parameters
         ----------
-        state : MonitorState
+        state : IntegrityState
         epoch : GroundEpoch
             One place in `observations` for each reference receiver of `params`. An epoch not later than the last one is
             refused with an event.
@@ -240,7 +240,7 @@ class GroundStation:
 
         Returns
         -------
-        state : MonitorState
+        state : IntegrityState
         monitored : Monitored
             Of the same epoch.
 
@@ -272,7 +272,7 @@ class GroundStation:
         return StationState(monitor=monitor, broadcast=broadcast), monitored, bursts
 
 
-def _monitor(state: MonitorState, epoch: GroundEpoch, params: GroundParams) -> tuple[MonitorState, Monitored]:
+def _monitor(state: IntegrityState, epoch: GroundEpoch, params: GroundParams) -> tuple[IntegrityState, Monitored]:
     events = EventLog(epoch.gps_week, epoch.tow_s)
     admitted = _admit(state, epoch, params, events)
     if admitted is None:
@@ -284,11 +284,11 @@ def _monitor(state: MonitorState, epoch: GroundEpoch, params: GroundParams) -> t
     return _process(admitted, epoch, params, events)
 
 
-def _refused(state: MonitorState, epoch: GroundEpoch) -> int:
+def _refused(state: IntegrityState, epoch: GroundEpoch) -> int:
     return refused_in_a_row(state.refused, state.refused_key, epoch_key(epoch.gps_week, epoch.tow_s))
 
 
-def _admit(state: MonitorState, epoch: GroundEpoch, params: GroundParams, events: EventLog) -> MonitorState | None:
+def _admit(state: IntegrityState, epoch: GroundEpoch, params: GroundParams, events: EventLog) -> IntegrityState | None:
     """The state to continue from; None refuses the epoch."""
     key = epoch_key(epoch.gps_week, epoch.tow_s)
     if state.key is None or key > state.key:
@@ -302,8 +302,8 @@ def _admit(state: MonitorState, epoch: GroundEpoch, params: GroundParams, events
 
 
 def _process(
-    state: MonitorState, epoch: GroundEpoch, params: GroundParams, events: EventLog
-) -> tuple[MonitorState, Monitored]:
+    state: IntegrityState, epoch: GroundEpoch, params: GroundParams, events: EventLog
+) -> tuple[IntegrityState, Monitored]:
     key = epoch_key(epoch.gps_week, epoch.tow_s)
     dt_s = float("nan") if state.key is None else (key - state.key) / 1000.0
     _, satellites = _constants(params)
@@ -312,72 +312,90 @@ def _process(
     _receiver_events(state, raw, events)
     exclusions = _released(state.exclusions, params, events)
 
-    followed, new_exclusions = _follow(state, epoch, raw, known, changed, exclusions, params, events)
-    seen = _seen(state, epoch, followed, known, new_exclusions, changed, dt_s, params)
-    watching, watched = watch(state.watching, seen, params)
-    new_exclusions = _exclude_channels(new_exclusions, watched.channels, events)
-    new_exclusions = _exclude_receivers(new_exclusions, watched.receivers, ExclusionCause.RECEIVER_BASELINES, events)
-    new_exclusions, noticed = _exclude_satellites(new_exclusions, watched)
-    measured = _measured(state, followed, watched, known, changed, dt_s, params)
-    made, new_exclusions, findings = agree(measured, new_exclusions, params)
-    long_term, new_exclusions, slow, slow_looks = watch_sigmas(state.long_term, made, new_exclusions, dt_s, params)
+    observed, new_exclusions = _track_channels(state, epoch, raw, known, changed, exclusions, params, events)
+    inputs = _monitor_inputs(state, epoch, observed, known, new_exclusions, changed, dt_s, params)
+    monitoring, monitor_output = run_monitors(state.monitoring, inputs, params)
+    new_exclusions = _exclude_channels(new_exclusions, monitor_output.channels, events)
+    new_exclusions = _exclude_receivers(
+        new_exclusions, monitor_output.receivers, ExclusionCause.RECEIVER_BASELINES, events
+    )
+    new_exclusions, noticed = _exclude_satellites(new_exclusions, monitor_output)
+    correction_inputs = _correction_inputs(state, observed, monitor_output, known, changed, dt_s, params)
+    corrections, new_exclusions, findings = resolve_consistency(correction_inputs, new_exclusions, params)
+    long_term, new_exclusions, slow, long_term_summaries = monitor_sigmas(
+        state.long_term, corrections, new_exclusions, dt_s, params
+    )
     findings = (*noticed, *findings, *slow)
     events.found(findings)
-    new_exclusions = _advanced(new_exclusions, measured, made, followed.channel_ok, watched, dt_s, params)
+    new_exclusions = _advanced(
+        new_exclusions, correction_inputs, corrections, observed.channel_ok, monitor_output, dt_s, params
+    )
 
-    condition = conclude(followed.tracked, followed.tracks, known, measured, made, new_exclusions, params)
-    ionosphere, protection, condition = _protect(state, key, condition, made, followed.should, params, events)
+    status = satellite_status(
+        observed.tracked, observed.tracks, known, correction_inputs, corrections, new_exclusions, params
+    )
+    ionosphere, protection, status = _protect(state, key, status, corrections, observed.predicted, params, events)
     integrity = integrity_of(
-        epoch.gps_week, epoch.tow_s, known, measured, made, condition, watched.orbit_bound, protection, params
+        epoch.gps_week,
+        epoch.tow_s,
+        known,
+        correction_inputs,
+        corrections,
+        status,
+        monitor_output.orbit_bound,
+        protection,
+        params,
     )
     channels = channel_epoch(
         epoch.gps_week,
         epoch.tow_s,
-        followed.tracked,
-        followed.tracks,
-        measured,
-        made,
-        condition,
+        observed.tracked,
+        observed.tracks,
+        correction_inputs,
+        corrections,
+        status,
         new_exclusions,
         state.channels,
     )
-    serving = bool((condition.state == ChannelState.USABLE).any())
-    contributing = (made.used & (condition.state == ChannelState.USABLE)).any(axis=1)
+    serving = bool((status.state == ChannelState.USABLE).any())
+    contributing = (corrections.used & (status.state == ChannelState.USABLE)).any(axis=1)
     _contribution_events(state, contributing, raw, new_exclusions, events)
-    _satellite_events(state, condition, serving, findings, events)
-    new = MonitorState(
+    _satellite_events(state, status, serving, findings, events)
+    new = IntegrityState(
         key=key,
         refused=0,
         refused_key=0,
         ephemerides=known,
-        tracking=followed.tracking,
+        tracking=observed.tracking,
         exclusions=new_exclusions,
-        before=_before(epoch, followed),
-        satellites=condition.state,
-        causes=condition.cause,
+        previous=_previous_epoch(epoch, observed),
+        satellites=status.state,
+        causes=status.cause,
         present=raw.present,
         contributing=contributing,
         serving=serving,
         channels=channels,
-        watching=watching,
+        monitoring=monitoring,
         long_term=long_term,
         ionosphere=ionosphere,
     )
-    checks = zip(("range", "power"), followed.checks, strict=True)
-    looks = {name: look(result, followed.tracked) for name, (_, result) in checks}
-    looks |= {**watched.looks, **consistency_looks(made, params), **slow_looks}
-    statistics = monitor_epoch(epoch.gps_week, epoch.tow_s, looks, watched.details, np.isfinite(integrity.state))
+    checks = zip(("range", "power"), observed.checks, strict=True)
+    summaries = {name: summarise(result, observed.tracked) for name, (_, result) in checks}
+    summaries |= {**monitor_output.summaries, **consistency_summaries(corrections, params), **long_term_summaries}
+    statistics = monitor_epoch(
+        epoch.gps_week, epoch.tow_s, summaries, monitor_output.details, np.isfinite(integrity.state)
+    )
     return new, Monitored(integrity=integrity, statistics=statistics, channels=channels, events=events.all())
 
 
-class _Followed(NamedTuple):
+class _TrackedEpoch(NamedTuple):
     """What the receivers measured at one epoch, checked, followed over slips and smoothed.
 
     Attributes
     ----------
     raw : RawEpoch
         Without measurements far from what is expected.
-    should : Expected
+    predicted : PredictedRanges
     tracked, channel_ok, settled : (R, N) bool arrays
         Channels with code and carrier; those that pass the checks of channels; those whose filters have settled.
     checks : sequence of (cause, result)
@@ -388,7 +406,7 @@ class _Followed(NamedTuple):
     """
 
     raw: RawEpoch
-    should: Expected
+    predicted: PredictedRanges
     tracked: BoolArray
     channel_ok: BoolArray
     settled: BoolArray
@@ -398,8 +416,8 @@ class _Followed(NamedTuple):
     correction_m: FloatArray
 
 
-def _follow(
-    state: MonitorState,
+def _track_channels(
+    state: IntegrityState,
     epoch: GroundEpoch,
     raw: RawEpoch,
     known: EphemerisState,
@@ -407,12 +425,12 @@ def _follow(
     exclusions: Exclusions,
     params: GroundParams,
     events: EventLog,
-) -> tuple[_Followed, Exclusions]:
+) -> tuple[_TrackedEpoch, Exclusions]:
     """Check the channels, exclude what fails, and smooth the rest."""
     site, _ = _constants(params)
-    should = expected(known.current, epoch.gps_week, epoch.tow_s, raw.code_m[:, L1], site)
+    predicted = predict_ranges(known.current, epoch.gps_week, epoch.tow_s, raw.code_m[:, L1], site)
     tracked = np.isfinite(raw.code_m[:, L1] + raw.carrier_m[:, L1])
-    checks = _channel_checks(raw, should, tracked, params)
+    checks = _channel_checks(raw, predicted, tracked, params)
     excluding = checks if params.monitors.power.exclude else checks[:1]
     exclusions = _exclude_channels(exclusions, excluding, events)
     exclusions = _exclude_receivers(
@@ -420,123 +438,123 @@ def _follow(
     )
     clean = _without(raw, checks[0][1].failed)
     key = epoch_key(epoch.gps_week, epoch.tow_s)
-    tracking, tracks = track(state.tracking, clean, key, _comparable_range_m(should, changed), params)
-    correction_m = range_correction_m(should.range_m, tracks.smoothed_m, should.clock_s)
-    followed = _Followed(
+    tracking, tracks = track(state.tracking, clean, key, _comparable_range_m(predicted, changed), params)
+    correction_m = range_correction_m(predicted.range_m, tracks.smoothed_m, predicted.clock_s)
+    observed = _TrackedEpoch(
         raw=clean,
-        should=should,
+        predicted=predicted,
         tracked=tracked,
         channel_ok=tracked & ~np.logical_or.reduce([check.failed for _, check in excluding]),
-        settled=_settled(tracks, correction_m, should, params),
+        settled=_settled(tracks, correction_m, predicted, params),
         checks=checks,
         tracking=tracking,
         tracks=tracks,
         correction_m=correction_m,
     )
-    return followed, exclusions
+    return observed, exclusions
 
 
-def _seen(
-    state: MonitorState,
+def _monitor_inputs(
+    state: IntegrityState,
     epoch: GroundEpoch,
-    followed: _Followed,
+    observed: _TrackedEpoch,
     known: EphemerisState,
     exclusions: Exclusions,
     changed: BoolArray,
     dt_s: float,
     params: GroundParams,
-) -> Seen:
+) -> MonitorInputs:
     """What the monitors of signals are given."""
     site, _ = _constants(params)
-    raw, tracks, should = followed.raw, followed.tracks, followed.should
-    usable = followed.channel_ok & exclusions.usable_channels()
-    high = should.elevation_rad >= params.elevation_mask_rad
-    due = ((usable & followed.settled).sum(axis=0) >= params.min_receivers) & np.isfinite(known.crc)
-    return Seen(
+    raw, tracks, predicted = observed.raw, observed.tracks, observed.predicted
+    usable = observed.channel_ok & exclusions.usable_channels()
+    high = predicted.elevation_rad >= params.elevation_mask_rad
+    due = ((usable & observed.settled).sum(axis=0) >= params.min_receivers) & np.isfinite(known.crc)
+    return MonitorInputs(
         code_m=raw.code_m,
         carrier_m=tracks.carrier_m,
         cn0_dbhz=raw.cn0_dbhz,
         slipped=tracks.slipped,
         usable=usable & high & ~exclusions.satellites.excluded,
-        ready=usable & followed.settled,
-        suspended=followed.channel_ok
-        & followed.settled
+        ready=usable & observed.settled,
+        suspended=observed.channel_ok
+        & observed.settled
         & exclusions.receivers.excluded[:, np.newaxis]
         & ~exclusions.channels.excluded,
         in_use=state.satellites == ChannelState.USABLE,
         due=due,
         may_refer=due & ~exclusions.satellites.excluded,
-        expected=should,
+        predicted=predicted,
         rebased=changed,
-        shift_m=_shift_m(state, epoch, should, changed, raw, site),
+        shift_m=_shift_m(state, epoch, predicted, changed, raw, site),
         dt_s=dt_s,
     )
 
 
-def _measured(
-    state: MonitorState,
-    followed: _Followed,
-    watched: Watched,
+def _correction_inputs(
+    state: IntegrityState,
+    observed: _TrackedEpoch,
+    monitor_output: MonitoringResult,
     known: EphemerisState,
     changed: BoolArray,
     dt_s: float,
     params: GroundParams,
-) -> Measured:
+) -> CorrectionInputs:
     """What the corrections are formed from."""
     site, _ = _constants(params)
-    before = state.before if dt_s <= params.max_gap_s else None
-    return Measured(
-        correction_m=followed.correction_m,
+    previous = state.previous if dt_s <= params.max_gap_s else None
+    return CorrectionInputs(
+        correction_m=observed.correction_m,
         previous_m=_previous_corrections(
-            before,
+            previous,
             known.current,
             changed,
-            followed.correction_m.shape,
+            observed.correction_m.shape,
             site,
         ),
         dt_s=dt_s,
-        settled=followed.settled,
-        judged=watched.ready,
-        elevation_rad=followed.should.elevation_rad,
+        settled=observed.settled,
+        judged=monitor_output.ready,
+        elevation_rad=observed.predicted.elevation_rad,
     )
 
 
 def _protect(
-    state: MonitorState,
+    state: IntegrityState,
     key: int,
-    condition: Condition,
-    made: Corrections,
-    should: Expected,
+    status: SatelliteStatus,
+    corrections: Corrections,
+    predicted: PredictedRanges,
     params: GroundParams,
     events: EventLog,
-) -> tuple[IonosphereState, Protection, Condition]:
+) -> tuple[IonosphereState, Protection, SatelliteStatus]:
     """Protection of what would be sent against ionospheric fronts; what it cannot protect is not used."""
     if state.key is None and not params.ionosphere.protects:
         events.add(EventKind.STATION, "station", "ionosphere_no_threat_model")
-    usable = condition.state == ChannelState.USABLE
-    sent = highest_sent(usable, should.elevation_rad, params) if params.ionosphere.protects else usable
-    sky = Sky(should.elevation_rad, should.azimuth_rad, made.sigmas.gnd_m, made.count)
+    usable = status.state == ChannelState.USABLE
+    sent = highest_sent(usable, predicted.elevation_rad, params) if params.ionosphere.protects else usable
+    sky = Sky(predicted.elevation_rad, predicted.azimuth_rad, corrections.sigmas.gnd_m, corrections.count)
     ionosphere, protection = protect(state.ionosphere, key, sent, sky, params)
-    before = state.ionosphere.protection
-    if ionosphere.protection is not None and ionosphere.protection is not before:
-        for cause, value, threshold in changes(before, ionosphere.protection):
+    previous = state.ionosphere.protection
+    if ionosphere.protection is not None and ionosphere.protection is not previous:
+        for cause, value, threshold in changes(previous, ionosphere.protection):
             events.add(EventKind.STATION, "station", cause, value, threshold)
-    return ionosphere, protection, condition if protection.available else withheld(condition)
+    return ionosphere, protection, status if protection.available else withheld(status)
 
 
-def _before(epoch: GroundEpoch, followed: _Followed) -> Before:
+def _previous_epoch(epoch: GroundEpoch, observed: _TrackedEpoch) -> PreviousEpoch:
     """What the next epoch needs of this one."""
-    return Before(
+    return PreviousEpoch(
         gps_week=epoch.gps_week,
         tow_s=epoch.tow_s,
-        code_m=followed.raw.code_m[:, L1],
-        smoothed_m=followed.tracks.smoothed_m,
-        correction_m=followed.correction_m,
+        code_m=observed.raw.code_m[:, L1],
+        smoothed_m=observed.tracks.smoothed_m,
+        correction_m=observed.correction_m,
     )
 
 
 def _ephemerides(
-    state: MonitorState, epoch: GroundEpoch, params: GroundParams, events: EventLog
+    state: IntegrityState, epoch: GroundEpoch, params: GroundParams, events: EventLog
 ) -> tuple[EphemerisState, BoolArray]:
     known = state.ephemerides
     for received in epoch.ephemerides:
@@ -560,13 +578,13 @@ def _of_this_epoch(epoch: GroundEpoch, events: EventLog) -> tuple[ObservationEpo
     return tuple(result)
 
 
-def _receiver_events(state: MonitorState, raw: RawEpoch, events: EventLog) -> None:
+def _receiver_events(state: IntegrityState, raw: RawEpoch, events: EventLog) -> None:
     for row in np.flatnonzero(raw.present != state.present):
         events.add(EventKind.INPUT, f"rr{row + 1}", "back" if raw.present[row] else "missing")
 
 
 def _contribution_events(
-    state: MonitorState, contributing: BoolArray, raw: RawEpoch, exclusions: Exclusions, events: EventLog
+    state: IntegrityState, contributing: BoolArray, raw: RawEpoch, exclusions: Exclusions, events: EventLog
 ) -> None:
     """Receivers that went out of the corrections, or came into them, without an event of their own."""
     told = ~raw.present | exclusions.receivers.excluded
@@ -593,11 +611,11 @@ def _released(exclusions: Exclusions, params: GroundParams, events: EventLog) ->
     return Exclusions(channels=channels, receivers=receivers, satellites=satellites)
 
 
-def _channel_checks(raw: RawEpoch, should: Expected, tracked: BoolArray, params: GroundParams) -> _Checks:
+def _channel_checks(raw: RawEpoch, predicted: PredictedRanges, tracked: BoolArray, params: GroundParams) -> _Checks:
     """Monitors of single channels, each ``(R, N)``; the first also keeps measurements out of the filters."""
-    raw_correction = range_correction_m(should.range_m, raw.code_m[:, L1], should.clock_s)
-    predicted = tracked & np.isfinite(should.clock_s)
-    residual = check_expected_range(raw_correction, predicted, params.max_range_residual_m)
+    raw_correction = range_correction_m(predicted.range_m, raw.code_m[:, L1], predicted.clock_s)
+    comparable = tracked & np.isfinite(predicted.clock_s)
+    residual = check_expected_range(raw_correction, comparable, params.max_range_residual_m)
     power = check_signal_power(raw.cn0_dbhz[:, L1], tracked, params.min_cn0_dbhz, required=params.require_cn0)
     return ((ExclusionCause.RANGE_RESIDUAL, residual), (ExclusionCause.SIGNAL_POWER, power))
 
@@ -638,20 +656,22 @@ def _exclude_receivers(
 
 
 def _shift_m(
-    state: MonitorState, epoch: GroundEpoch, should: Expected, changed: BoolArray, raw: RawEpoch, site: Site
+    state: IntegrityState, epoch: GroundEpoch, predicted: PredictedRanges, changed: BoolArray, raw: RawEpoch, site: Site
 ) -> FloatArray:
     """What another ephemeris than that of the epoch before adds to a carrier's residual, ``(R, N)`` [m]."""
     if not changed.any():
-        return np.zeros_like(should.range_m)
-    old = expected(state.ephemerides.current, epoch.gps_week, epoch.tow_s, raw.code_m[:, L1], site)
-    shift_m = old.range_m - should.range_m - SPEED_OF_LIGHT_MPS * (old.clock_s - should.clock_s)
+        return np.zeros_like(predicted.range_m)
+    old = predict_ranges(state.ephemerides.current, epoch.gps_week, epoch.tow_s, raw.code_m[:, L1], site)
+    shift_m = old.range_m - predicted.range_m - SPEED_OF_LIGHT_MPS * (old.clock_s - predicted.clock_s)
     return np.where(changed, shift_m, 0.0)
 
 
-def _exclude_satellites(exclusions: Exclusions, watched: Watched) -> tuple[Exclusions, tuple[Finding, ...]]:
+def _exclude_satellites(
+    exclusions: Exclusions, monitor_output: MonitoringResult
+) -> tuple[Exclusions, tuple[Finding, ...]]:
     """Exclude the satellites that monitors of signals fail; several may fail one, and each says so."""
     satellites, findings = exclusions.satellites, []
-    for cause, result in watched.satellites:
+    for cause, result in monitor_output.satellites:
         if not result.failed.any():
             continue
         for satellite in np.flatnonzero(result.failed & ~exclusions.satellites.excluded):
@@ -668,37 +688,37 @@ def _without(raw: RawEpoch, failed: BoolArray) -> RawEpoch:
     return raw._replace(code_m=np.where(failed[:, np.newaxis, :], np.nan, raw.code_m))
 
 
-def _comparable_range_m(should: Expected, changed: BoolArray) -> FloatArray:
+def _comparable_range_m(predicted: PredictedRanges, changed: BoolArray) -> FloatArray:
     """Expected ranges for the slip tests, missing where another ephemeris would look like a slip."""
-    range_m = should.range_m - SPEED_OF_LIGHT_MPS * should.clock_s
+    range_m = predicted.range_m - SPEED_OF_LIGHT_MPS * predicted.clock_s
     return np.where(changed, np.nan, range_m)
 
 
 def _previous_corrections(
-    before: Before | None, current: Ephemeris, changed: BoolArray, shape: tuple[int, ...], site: Site
+    previous: PreviousEpoch | None, current: Ephemeris, changed: BoolArray, shape: tuple[int, ...], site: Site
 ) -> FloatArray:
     """PR_sc of the epoch before, as today's ephemerides would have made it."""
-    if before is None:
+    if previous is None:
         return np.full(shape, np.nan)
     if not changed.any():
-        return before.correction_m
-    should = expected(current, before.gps_week, before.tow_s, before.code_m, site)
-    again = range_correction_m(should.range_m, before.smoothed_m, should.clock_s)
-    return np.where(changed, again, before.correction_m)
+        return previous.correction_m
+    predicted = predict_ranges(current, previous.gps_week, previous.tow_s, previous.code_m, site)
+    again = range_correction_m(predicted.range_m, previous.smoothed_m, predicted.clock_s)
+    return np.where(changed, again, previous.correction_m)
 
 
-def _settled(tracks: Tracks, correction_m: FloatArray, should: Expected, params: GroundParams) -> BoolArray:
+def _settled(tracks: Tracks, correction_m: FloatArray, predicted: PredictedRanges, params: GroundParams) -> BoolArray:
     """Channels whose filters have run long enough, of satellites above the mask, ``(R, N)``."""
-    high = should.elevation_rad >= params.elevation_mask_rad
+    high = predicted.elevation_rad >= params.elevation_mask_rad
     return np.isfinite(correction_m).all(axis=0) & (tracks.age_s >= params.settle_time_s) & high
 
 
 def _advanced(
     exclusions: Exclusions,
-    measured: Measured,
-    made: Corrections,
+    correction_inputs: CorrectionInputs,
+    corrections: Corrections,
     channel_ok: BoolArray,
-    watched: Watched,
+    monitor_output: MonitoringResult,
     dt_s: float,
     params: GroundParams,
 ) -> Exclusions:
@@ -706,8 +726,10 @@ def _advanced(
     latches = (exclusions.channels, exclusions.receivers, exclusions.satellites)
     if not any(latch.remembers for latch in latches):
         return exclusions
-    satellite_ok = watched.passed(params.readmission_share)
-    passed = standing(measured, made, exclusions, channel_ok, watched.receivers_quiet, satellite_ok, params)
+    satellite_ok = monitor_output.passed(params.readmission_share)
+    passed = readmission_state(
+        correction_inputs, corrections, exclusions, channel_ok, monitor_output.receivers_quiet, satellite_ok, params
+    )
     return Exclusions(
         channels=advance(exclusions.channels, passed.channels, dt_s, params.max_gap_s),
         receivers=advance(exclusions.receivers, passed.receivers, dt_s, params.max_gap_s),
@@ -716,10 +738,10 @@ def _advanced(
 
 
 def _satellite_events(
-    state: MonitorState, condition: Condition, serving: bool, findings: tuple[Finding, ...], events: EventLog
+    state: IntegrityState, status: SatelliteStatus, serving: bool, findings: tuple[Finding, ...], events: EventLog
 ) -> None:
     """Satellites that came into use or went out of it, and the station with the first and the last of them."""
-    now, was = condition.state == ChannelState.USABLE, state.satellites == ChannelState.USABLE
+    now, was = status.state == ChannelState.USABLE, state.satellites == ChannelState.USABLE
     told = {finding.subject for finding in findings}
     for satellite in np.flatnonzero(now != was):
         subject = SAT_IDS[satellite]
@@ -727,7 +749,7 @@ def _satellite_events(
             cause = ExclusionCause(int(state.causes[satellite]))
             events.add(EventKind.READMISSION, subject, cause.word)
         elif subject not in told:
-            cause = ExclusionCause(int(condition.cause[satellite])) or ExclusionCause.NOT_TRACKED
+            cause = ExclusionCause(int(status.cause[satellite])) or ExclusionCause.NOT_TRACKED
             events.add(EventKind.EXCLUSION, subject, cause.word)
     if serving != state.serving:
         events.add(

@@ -96,7 +96,7 @@ class Fix:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Attempt:
+class PositionResult:
     """What became of the search for a position.
 
     Attributes
@@ -150,7 +150,9 @@ class _Sky:
     speed_mps: float
 
 
-def tested_position(inputs: PositionInputs, start_ecef_m: FloatArray, speed: Speed, params: AirborneParams) -> Attempt:
+def tested_position(
+    inputs: PositionInputs, start_ecef_m: FloatArray, speed: Speed, params: AirborneParams
+) -> PositionResult:
     """Position of one epoch without the satellites that fail the range test; arguments as :func:`solve`.
 
     When more fail, or are held out from earlier epochs, than the parameter allows, there is no position: so many faults
@@ -176,7 +178,7 @@ def tested_position(inputs: PositionInputs, start_ecef_m: FloatArray, speed: Spe
     return replace(attempt, fix=fix, range_error_m=errors)
 
 
-def solve(inputs: PositionInputs, start_ecef_m: FloatArray, speed: Speed, params: AirborneParams) -> Attempt:
+def solve(inputs: PositionInputs, start_ecef_m: FloatArray, speed: Speed, params: AirborneParams) -> PositionResult:
     """Position of one epoch.
 
     Parameters
@@ -190,7 +192,7 @@ def solve(inputs: PositionInputs, start_ecef_m: FloatArray, speed: Speed, params
 
     Returns
     -------
-    Attempt
+    PositionResult
         Without a range test.
     """
     position = start_ecef_m
@@ -205,7 +207,7 @@ def solve(inputs: PositionInputs, start_ecef_m: FloatArray, speed: Speed, params
     else:
         step = None
     fix = _fix(inputs, sky, step) if step is not None else None
-    return Attempt(fix=fix, reason=reason, elevation_rad=sky.elevation_rad, distance_m=sky.distance_m)
+    return PositionResult(fix=fix, reason=reason, elevation_rad=sky.elevation_rad, distance_m=sky.distance_m)
 
 
 def _sky(inputs: PositionInputs, position: FloatArray, speed: Speed, params: AirborneParams) -> _Sky:

@@ -174,7 +174,7 @@ def reception_step(
         else:
             waiting.append(burst)
     ready.sort(key=lambda burst: (epoch_key(burst.gps_week, burst.tow_s), burst.slot))
-    intake = _Intake(replace(state, waiting=tuple(waiting)), gps_week, tow_s, params)
+    intake = _VdbMessageProcessor(replace(state, waiting=tuple(waiting)), gps_week, tow_s, params)
     intake.count(failed=malformed)
     for burst in ready:
         intake.take(burst)
@@ -182,7 +182,7 @@ def reception_step(
     return intake.finished(), tuple(intake.events)
 
 
-class _Intake:
+class _VdbMessageProcessor:
     """Works through the bursts of one epoch; the state it hands back is frozen as ever."""
 
     def __init__(self, state: ReceptionState, gps_week: int, tow_s: float, params: AirborneParams) -> None:

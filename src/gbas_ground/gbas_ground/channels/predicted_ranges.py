@@ -41,7 +41,7 @@ def site_of(params: GroundParams) -> Site:
     return Site(positions_m=positions, enu=rot_enu_ecef(params.latitude_rad, params.longitude_rad))
 
 
-class Expected(NamedTuple):
+class PredictedRanges(NamedTuple):
     """Expected ranges and clocks ``(R, N)`` [m], [s]; elevations and azimuths at the reference point ``(N,)`` [rad]."""
 
     range_m: FloatArray
@@ -50,9 +50,9 @@ class Expected(NamedTuple):
     azimuth_rad: FloatArray
 
 
-def expected(
+def predict_ranges(
     ephemeris: Ephemeris, gps_week: int, tow_s: float, code_m: FloatArray, site: Site, band: int = L1
-) -> Expected:
+) -> PredictedRanges:
     """Geometric ranges with Earth rotation, satellite clocks, elevations and azimuths.
 
     Parameters
@@ -71,4 +71,4 @@ def expected(
     state = transmit_place(ephemeris, gps_week, tow_s, np.where(np.isfinite(own), own, _MEAN_RANGE_M), band)
     range_m, los = rotated_range(site.positions_m, state.position_m)
     east, north, up = (los[-1, 0] * axis[0] + los[-1, 1] * axis[1] + los[-1, 2] * axis[2] for axis in site.enu)
-    return Expected(range_m[:-1], state.clock_s[:-1], np.arcsin(up), np.arctan2(east, north))
+    return PredictedRanges(range_m[:-1], state.clock_s[:-1], np.arcsin(up), np.arctan2(east, north))

@@ -9,8 +9,8 @@ import numpy as np
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import missing
 from gbas_ground.channels.tracking import Tracks
-from gbas_ground.consistency import Corrections, Exclusions, Measured
-from gbas_ground.executive.satellite_status import Condition
+from gbas_ground.consistency import CorrectionInputs, Corrections, Exclusions
+from gbas_ground.executive.satellite_status import SatelliteStatus
 from gbas_msgs_py.codes import ExclusionCause
 from gbas_msgs_py.records import MAX_REFERENCE_RECEIVERS, ChannelEpoch, ChannelState
 
@@ -27,9 +27,9 @@ def channel_epoch(
     tow_s: float,
     tracked: BoolArray,
     tracks: Tracks,
-    measured: Measured,
-    made: Corrections,
-    condition: Condition,
+    correction_inputs: CorrectionInputs,
+    corrections: Corrections,
+    status: SatelliteStatus,
     exclusions: Exclusions,
     before: ChannelEpoch | None,
 ) -> ChannelEpoch:
@@ -41,19 +41,19 @@ def channel_epoch(
         The epoch.
     tracked : (R, N) bool array
         Channels with code and carrier.
-    tracks, measured, made, condition, exclusions
+    tracks, correction_inputs, corrections, status, exclusions
         What the station found.
     before : ChannelEpoch or None
         The table of the epoch before, for the durations.
     """
-    row = (condition.state != ChannelState.NOT_TRACKED) | (condition.cause != ExclusionCause.NONE)
-    satellites = _Entries(np.where(row, condition.state, np.nan), np.where(row, condition.cause, np.nan))
-    channels = _channels(tracked, tracks, measured, made, condition, exclusions)
+    row = (status.state != ChannelState.NOT_TRACKED) | (status.cause != ExclusionCause.NONE)
+    satellites = _Entries(np.where(row, status.state, np.nan), np.where(row, status.cause, np.nan))
+    channels = _channels(tracked, tracks, correction_inputs, corrections, status, exclusions)
     shown = row & (tracked.any(axis=0) | exclusions.channels.excluded.any(axis=0))
     state, cause = missing(MAX_REFERENCE_RECEIVERS), missing(MAX_REFERENCE_RECEIVERS)
     state[: len(tracked)] = np.where(shown, channels.state, np.nan)
     cause[: len(tracked)] = np.where(shown, channels.cause, np.nan)
-    elapsed_s = 0.0 if not measured.dt_s > 0.0 else measured.dt_s
+    elapsed_s = 0.0 if not correction_inputs.dt_s > 0.0 else correction_inputs.dt_s
     since_s, channel_since_s = missing(), missing(MAX_REFERENCE_RECEIVERS)
     if before is not None:
         since_s = _same_for(satellites, _Entries(before.state, before.cause), before.since_s + elapsed_s)
@@ -79,15 +79,15 @@ def _same_for(now: _Entries, before: _Entries, since_s: FloatArray) -> FloatArra
 def _channels(
     tracked: BoolArray,
     tracks: Tracks,
-    measured: Measured,
-    made: Corrections,
-    condition: Condition,
+    correction_inputs: CorrectionInputs,
+    corrections: Corrections,
+    status: SatelliteStatus,
     exclusions: Exclusions,
 ) -> _Entries:
     """Channels ``(R, N)``: what is wrong with a channel itself comes before what is wrong with its satellite."""
     by_receiver = np.broadcast_to(exclusions.receivers.excluded[:, np.newaxis], tracked.shape)
-    settling = np.isfinite(tracks.age_s) & ~measured.settled & (condition.cause != ExclusionCause.BELOW_MASK)
-    usable = made.used & (condition.state == ChannelState.USABLE)
+    settling = np.isfinite(tracks.age_s) & ~correction_inputs.settled & (status.cause != ExclusionCause.BELOW_MASK)
+    usable = corrections.used & (status.state == ChannelState.USABLE)
     reasons = (
         (exclusions.channels.excluded, exclusions.channels.state, exclusions.channels.cause),
         (by_receiver, exclusions.receivers.state[:, np.newaxis], exclusions.receivers.cause[:, np.newaxis]),
@@ -95,8 +95,8 @@ def _channels(
         (usable, float(ChannelState.USABLE), float(ExclusionCause.NONE)),
         (settling, float(ChannelState.SETTLING), float(ExclusionCause.SETTLING)),
     )
-    state = np.broadcast_to(np.where(condition.state == ChannelState.USABLE, np.nan, condition.state), tracked.shape)
-    cause = np.broadcast_to(condition.cause, tracked.shape)
+    state = np.broadcast_to(np.where(status.state == ChannelState.USABLE, np.nan, status.state), tracked.shape)
+    cause = np.broadcast_to(status.cause, tracked.shape)
     # a channel that is ready and not used has its satellite's reason, or its receiver is not in use
     state = np.where(np.isnan(state), float(ChannelState.EXCLUDED), state)
     cause = np.where(cause == ExclusionCause.NONE, float(ExclusionCause.TOO_FEW_COMMON_SATELLITES), cause)

@@ -12,7 +12,7 @@ from gbas_core.satellites import N_SATS, missing
 from gbas_ground.channels.ephemerides import EphemerisState
 from gbas_ground.channels.tracking import Tracks
 from gbas_ground.claims.orbit_claim import claimed_decorrelation
-from gbas_ground.consistency import Corrections, Exclusions, Measured
+from gbas_ground.consistency import CorrectionInputs, Corrections, Exclusions
 from gbas_ground.corrections.sigma import MAX_SIGMA_M
 from gbas_ground.ionosphere.protection import Protection
 from gbas_ground.params import GroundParams
@@ -21,22 +21,22 @@ from gbas_msgs_py.records import MAX_REFERENCE_RECEIVERS, ChannelState, Integrit
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Condition:
+class SatelliteStatus:
     """State (:class:`ChannelState`) and cause (:class:`ExclusionCause`) of every satellite, ``(N,)``."""
 
     state: FloatArray
     cause: FloatArray
 
 
-def conclude(
+def satellite_status(
     tracked: BoolArray,
     tracks: Tracks,
     known: EphemerisState,
-    measured: Measured,
-    made: Corrections,
+    correction_inputs: CorrectionInputs,
+    corrections: Corrections,
     exclusions: Exclusions,
     params: GroundParams,
-) -> Condition:
+) -> SatelliteStatus:
     """Condition of every satellite; of several reasons against its use the first in the list below is told.
 
     Parameters
@@ -45,21 +45,23 @@ def conclude(
         Channels with code and carrier.
     """
     seen = tracked.any(axis=0)
-    visible = measured.elevation_rad >= params.elevation_mask_rad
+    visible = correction_inputs.elevation_rad >= params.elevation_mask_rad
     usable = exclusions.usable_channels()
-    ready = (usable & measured.ready).sum(axis=0)
-    settling = (usable & np.isfinite(tracks.age_s) & ~measured.ready).sum(axis=0)
-    short = made.count < params.min_receivers
+    ready = (usable & correction_inputs.ready).sum(axis=0)
+    settling = (usable & np.isfinite(tracks.age_s) & ~correction_inputs.ready).sum(axis=0)
+    short = corrections.count < params.min_receivers
     waiting = short & (ready < params.min_receivers) & (ready + settling >= params.min_receivers)
-    unmonitored = waiting & ~measured.judged & ((usable & measured.settled).sum(axis=0) >= params.min_receivers)
+    unmonitored = (
+        waiting & ~correction_inputs.judged & ((usable & correction_inputs.settled).sum(axis=0) >= params.min_receivers)
+    )
     channel_cause = _channel_cause(tracked, exclusions)
-    no_rate = ~np.isfinite(made.prc_m + made.rrc_mps).all(axis=0)
+    no_rate = ~np.isfinite(corrections.prc_m + corrections.rrc_mps).all(axis=0)
 
     excluded = ChannelState.EXCLUDED
     reasons: tuple[tuple[BoolArray | np.bool, ArrayLike, ArrayLike], ...] = (
         (~seen & ~visible, ChannelState.NOT_TRACKED, ExclusionCause.NONE),
         (~seen, ChannelState.NOT_TRACKED, ExclusionCause.NOT_TRACKED),
-        (np.isnan(measured.elevation_rad + known.crc), excluded, ExclusionCause.NO_EPHEMERIS),
+        (np.isnan(correction_inputs.elevation_rad + known.crc), excluded, ExclusionCause.NO_EPHEMERIS),
         (~visible, excluded, ExclusionCause.BELOW_MASK),
         (exclusions.satellites.excluded, exclusions.satellites.state, exclusions.satellites.cause),
         (unmonitored, ChannelState.SETTLING, ExclusionCause.UNMONITORED),
@@ -67,7 +69,7 @@ def conclude(
         (short & (channel_cause >= float(FIRST_LATCHED)), excluded, channel_cause),
         (short & (ready >= params.min_receivers), excluded, ExclusionCause.TOO_FEW_COMMON_SATELLITES),
         (short, excluded, ExclusionCause.TOO_FEW_RECEIVERS),
-        (~_sigma_fits(made), excluded, ExclusionCause.SIGMA_TOO_LARGE),
+        (~_sigma_fits(corrections), excluded, ExclusionCause.SIGMA_TOO_LARGE),
         (no_rate, excluded, ExclusionCause.NO_RATE),
     )
     state: FloatArray = np.full(N_SATS, float(ChannelState.USABLE))
@@ -76,7 +78,7 @@ def conclude(
         if mask.any():
             state = np.where(mask, its_state, state)
             cause = np.where(mask, its_cause, cause)
-    return Condition(state=state, cause=cause)
+    return SatelliteStatus(state=state, cause=cause)
 
 
 def _channel_cause(tracked: BoolArray, exclusions: Exclusions) -> FloatArray:
@@ -86,17 +88,17 @@ def _channel_cause(tracked: BoolArray, exclusions: Exclusions) -> FloatArray:
     return np.asarray(causes.max(axis=0), dtype=np.float64)
 
 
-def _sigma_fits(made: Corrections) -> BoolArray:
-    sigmas = np.array(made.sigmas)
+def _sigma_fits(corrections: Corrections) -> BoolArray:
+    sigmas = np.array(corrections.sigmas)
     return np.asarray(((sigmas > 0.0) & (sigmas <= MAX_SIGMA_M)).all(axis=0))
 
 
-def withheld(condition: Condition) -> Condition:
+def withheld(status: SatelliteStatus) -> SatelliteStatus:
     """The condition when no usable satellite may be used for want of protection against ionospheric fronts."""
-    usable = condition.state == ChannelState.USABLE
-    return Condition(
-        state=np.where(usable, float(ChannelState.EXCLUDED), condition.state),
-        cause=np.where(usable, float(ExclusionCause.IONOSPHERE_UNPROTECTED), condition.cause),
+    usable = status.state == ChannelState.USABLE
+    return SatelliteStatus(
+        state=np.where(usable, float(ChannelState.EXCLUDED), status.state),
+        cause=np.where(usable, float(ExclusionCause.IONOSPHERE_UNPROTECTED), status.cause),
     )
 
 
@@ -104,9 +106,9 @@ def integrity_of(
     gps_week: int,
     tow_s: float,
     known: EphemerisState,
-    measured: Measured,
-    made: Corrections,
-    condition: Condition,
+    correction_inputs: CorrectionInputs,
+    corrections: Corrections,
+    status: SatelliteStatus,
     orbit_bound: FloatArray,
     protection: Protection,
     params: GroundParams,
@@ -115,8 +117,8 @@ def integrity_of(
 
     `orbit_bound` ``(N,)`` is what the ephemeris monitor supports, which P follows from [m/m].
     """
-    usable = condition.state == ChannelState.USABLE
-    row = (condition.state != ChannelState.NOT_TRACKED) | (condition.cause != ExclusionCause.NONE)
+    usable = status.state == ChannelState.USABLE
+    row = (status.state != ChannelState.NOT_TRACKED) | (status.cause != ExclusionCause.NONE)
 
     def of_row(values: FloatArray) -> FloatArray:
         return np.where(row, values, np.nan)
@@ -125,31 +127,31 @@ def integrity_of(
         return np.where(usable, values, np.nan)
 
     external = bool(params.external_monitor)
-    n_receivers = made.used.shape[0]
+    n_receivers = corrections.used.shape[0]
     used, b = missing(MAX_REFERENCE_RECEIVERS), missing(MAX_REFERENCE_RECEIVERS)
-    used[:n_receivers] = of_row((made.used & usable).astype(np.float64))
-    b[:n_receivers] = of_usable(made.b_m[0])
+    used[:n_receivers] = of_row((corrections.used & usable).astype(np.float64))
+    b[:n_receivers] = of_usable(corrections.b_m[0])
     return IntegrityEpoch(
         gps_week=gps_week,
         tow_s=tow_s,
-        n_receivers=float((made.used & usable).any(axis=1).sum()),
+        n_receivers=float((corrections.used & usable).any(axis=1).sum()),
         sigma_vert_iono_gradient=protection.sigma_vig,
-        state=of_row(condition.state),
-        cause=of_row(condition.cause),
-        elevation_rad=of_row(measured.elevation_rad),
+        state=of_row(status.state),
+        cause=of_row(status.cause),
+        elevation_rad=of_row(correction_inputs.elevation_rad),
         p_ephemeris=of_usable(claimed_decorrelation(orbit_bound, params.p_ephemeris, external=external)),
         p_ephemeris_d=of_usable(
             claimed_decorrelation(orbit_bound, params.p_ephemeris_d or params.p_ephemeris, external=external)
         ),
         iod=of_row(known.current.iod),
         ephemeris_crc=of_row(known.crc),
-        prc_100_m=of_usable(made.prc_m[0]),
-        rrc_100_mps=of_usable(made.rrc_mps[0]),
-        prc_30_m=of_usable(made.prc_m[1]),
-        rrc_30_mps=of_usable(made.rrc_mps[1]),
-        sigma_pr_gnd_m=of_usable(protection.inflated_m(made.sigmas.gnd_m)),
-        sigma_pr_gnd_d_m=of_usable(made.sigmas.gnd_d_m),
-        sigma_pr_gnd_30_m=of_usable(made.sigmas.gnd_30_m),
+        prc_100_m=of_usable(corrections.prc_m[0]),
+        rrc_100_mps=of_usable(corrections.rrc_mps[0]),
+        prc_30_m=of_usable(corrections.prc_m[1]),
+        rrc_30_mps=of_usable(corrections.rrc_mps[1]),
+        sigma_pr_gnd_m=of_usable(protection.inflated_m(corrections.sigmas.gnd_m)),
+        sigma_pr_gnd_d_m=of_usable(corrections.sigmas.gnd_d_m),
+        sigma_pr_gnd_30_m=of_usable(corrections.sigmas.gnd_30_m),
         b_m=b,
         receiver_used=used,
     )

@@ -16,7 +16,7 @@ from gbas_msgs_py.records import GROUND_MONITORS, MonitorEpoch, MonitorState
 IntArray = NDArray[np.intp]
 
 
-class Look(NamedTuple):
+class MonitorSummary(NamedTuple):
     """One monitor's view of the satellites, each ``(N,)``: statistic, threshold, what failed, and what was due."""
 
     statistic: FloatArray
@@ -52,7 +52,7 @@ def worst_of(result: MonitorResult, *, axes: int) -> MonitorResult:
     )
 
 
-def look(result: MonitorResult, due: BoolArray) -> Look:
+def summarise(result: MonitorResult, due: BoolArray) -> MonitorSummary:
     """The worst of a monitor's tests of each satellite.
 
     Parameters
@@ -64,19 +64,19 @@ def look(result: MonitorResult, due: BoolArray) -> Look:
 
     Returns
     -------
-    Look
+    MonitorSummary
         Statistic and threshold are those of the test that is furthest over its threshold, or nearest to it.
     """
     axes = result.statistic.ndim - 1
     worst = worst_of(result, axes=axes) if axes else result
     expected = due if due.ndim == 1 else np.logical_or.reduce(due.reshape(-1, N_SATS))
-    return Look(worst.statistic, worst.threshold, worst.failed, expected)
+    return MonitorSummary(worst.statistic, worst.threshold, worst.failed, expected)
 
 
 def monitor_epoch(
     gps_week: int,
     tow_s: float,
-    looks: Mapping[str, Look],
+    summaries: Mapping[str, MonitorSummary],
     details: Mapping[str, Any],
     shown: BoolArray,
 ) -> MonitorEpoch:
@@ -86,7 +86,7 @@ def monitor_epoch(
     ----------
     gps_week, tow_s
         The epoch.
-    looks : mapping
+    summaries : mapping
         By the names in :data:`GROUND_MONITORS`; a monitor that is missing is not due.
     details : mapping
         Further fields of the table.
@@ -97,8 +97,8 @@ def monitor_epoch(
     statistic, threshold = missing(count), missing(count)
     failed, due = np.zeros((count, N_SATS), dtype=bool), np.zeros((count, N_SATS), dtype=bool)
     for row, name in enumerate(GROUND_MONITORS):
-        if name in looks:
-            statistic[row], threshold[row], failed[row], due[row] = looks[name]
+        if name in summaries:
+            statistic[row], threshold[row], failed[row], due[row] = summaries[name]
     looked = np.isfinite(statistic + threshold)
     state = np.where(looked, float(MonitorState.PASSED), float(MonitorState.NOT_MONITORED))
     state = np.where(due, state, float(MonitorState.NOT_DUE))

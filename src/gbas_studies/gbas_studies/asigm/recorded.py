@@ -19,7 +19,7 @@ from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import satellites_of
 from gbas_core.signals import BANDS, L1
 from gbas_ground.channels import ephemerides
-from gbas_ground.channels.predicted_ranges import expected, site_of
+from gbas_ground.channels.predicted_ranges import predict_ranges, site_of
 from gbas_ground.channels.tracking import stack
 from gbas_ground.monitors.double_difference import (
     Troposphere,
@@ -95,16 +95,16 @@ def pair_series(chosen: RecordedSet, data: Path, n_epochs: int | None = None) ->
             known, _ = ephemerides.receive(known, each, week, tow_s, station)
         known, _, _ = ephemerides.choose(known, week, tow_s, station)
         raw = stack(epoch.ground, satellites_of("GE"))
-        should = expected(known.current, week, tow_s, raw.code_m[:, L1], where)
-        delay_m = _AIR.delay_m(should.elevation_rad, should.azimuth_rad, site.baselines.place_m)
-        residual = carrier_residual_m(raw.carrier_m, should.range_m, should.clock_s, delay_m, params.bands)
-        due = (should.elevation_rad >= MASK_RAD) & np.isfinite(residual[:, 0]).all(axis=0)
-        references = reference_satellites(due, should.elevation_rad, params.references)
+        predicted = predict_ranges(known.current, week, tow_s, raw.code_m[:, L1], where)
+        delay_m = _AIR.delay_m(predicted.elevation_rad, predicted.azimuth_rad, site.baselines.place_m)
+        residual = carrier_residual_m(raw.carrier_m, predicted.range_m, predicted.clock_s, delay_m, params.bands)
+        due = (predicted.elevation_rad >= MASK_RAD) & np.isfinite(residual[:, 0]).all(axis=0)
+        references = reference_satellites(due, predicted.elevation_rad, params.references)
         made = double_differences(
             np.where(due, residual, np.nan),
             site.baselines,
             references,
-            should.elevation_rad,
+            predicted.elevation_rad,
             params.noise,
             params.bands,
         )
@@ -112,7 +112,7 @@ def pair_series(chosen: RecordedSet, data: Path, n_epochs: int | None = None) ->
         rows.append(
             (
                 made.residual_m[0], made.sigma_m[0], found.by_baseline.statistic[0], found.by_baseline.threshold[0],
-                should.elevation_rad, found.verdict.failed,
+                predicted.elevation_rad, found.verdict.failed,
             )
         )  # fmt: skip
     residual, sigma, statistic, threshold, elevation, failed = (np.array(each) for each in zip(*rows, strict=True))

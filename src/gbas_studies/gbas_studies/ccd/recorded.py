@@ -20,7 +20,7 @@ from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import N_SATS, satellites_of
 from gbas_core.signals import BANDS, L1, L2, L5, N_BANDS, SPEED_OF_LIGHT_MPS
 from gbas_ground.channels import ephemerides as station_ephemerides
-from gbas_ground.channels.predicted_ranges import expected, site_of
+from gbas_ground.channels.predicted_ranges import predict_ranges, site_of
 from gbas_ground.channels.tracking import stack
 from gbas_ground.monitors.code_carrier_divergence import CcdParams, ccd_step, initial_ccd
 from gbas_ground.monitors.divergence_covariance import Calibration, StatisticCovariance, calibrate
@@ -269,25 +269,25 @@ class Observer:
             self._known, _ = station_ephemerides.receive(self._known, each, week, tow_s, self._station)
         self._known, changed, _ = station_ephemerides.choose(self._known, week, tow_s, self._station)
         raw = stack(epoch.ground, satellites_of("GE"))
-        should = expected(self._known.current, week, tow_s, raw.code_m[:, L1], self._site)
+        predicted = predict_ranges(self._known.current, week, tow_s, raw.code_m[:, L1], self._site)
         self._slips, found = slip_step(
             self._slips, raw.code_m, raw.carrier_m, raw.doppler_hz, raw.lli, dt_s, self._params,
-            range_m=np.where(changed, np.nan, should.range_m - SPEED_OF_LIGHT_MPS * should.clock_s),
+            range_m=np.where(changed, np.nan, predicted.range_m - SPEED_OF_LIGHT_MPS * predicted.clock_s),
         )  # fmt: skip
         # A channel that was away is not protected by the slip tests: it starts anew, as its smoothing filter does.
         present = np.isfinite(raw.code_m + raw.carrier_m)
         returned = present & ~self._present
         self._present = present
-        high = np.where(np.isfinite(should.elevation_rad), should.elevation_rad >= MASK_RAD, True)
+        high = np.where(np.isfinite(predicted.elevation_rad), predicted.elevation_rad >= MASK_RAD, True)
         used = np.broadcast_to(high, raw.code_m[:, 0].shape)
         return TwoFrequencyInput(
             code_m=raw.code_m,
             carrier_m=found.carrier_m,
             restarted=found.slipped | returned,
-            range_m=should.range_m,
-            clock_s=should.clock_s,
+            range_m=predicted.range_m,
+            clock_s=predicted.clock_s,
             rebased=changed,
-            elevation_rad=should.elevation_rad,
+            elevation_rad=predicted.elevation_rad,
             used=used,
             clock_used=used & ~failed,
         )
