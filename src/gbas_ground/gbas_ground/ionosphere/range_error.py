@@ -19,8 +19,8 @@ The monitor of gradients is credited nothing: it sees slopes over the antennas o
 blind gradients; a front that ends short of the antennas, which are 450 m wide, is hardly less harmful (2.6 % at 2.6
 km).
 
-Sources: gbas_core.ranging.smoothing (filter); Pullen, Park, Enge, Radio Science 44 (2009) RS0A21 (``g (x + 2 tau v)``). The
-receding front and its credit are ours.
+Sources: gbas_core.ranging.smoothing (filter); Pullen, Park, Enge, Radio Science 44 (2009) RS0A21
+(``g (x + 2 tau v)``). The receding front and its credit are ours.
 """
 
 from __future__ import annotations

@@ -15,6 +15,8 @@ business but the executive's (:mod:`gbas_ground.exclusions`).
 :mod:`~.carrier_acceleration`        step, rate and acceleration of the carrier
 :mod:`~.common_slip`                 carriers several receivers lose count of at once
 :mod:`~.ionosphere_gradient`         double-difference carriers: gradients of the ionosphere
+:mod:`~.gradient_estimates`          gradient vectors and fronts from baselines of several directions
+:mod:`~.shared_receiver`             the receiver behind double differences that trip together
 :mod:`~.ephemeris_residual`          double-difference carriers: the orbit, and the P a site can claim
 :mod:`~.ephemeris_change`            a new ephemeris against the one before
 :mod:`~.code_carrier_divergence`     code-carrier divergence of single bands (GAST D)
@@ -24,5 +26,6 @@ business but the executive's (:mod:`gbas_ground.exclusions`).
 ===================================  ==========================================================
 
 What they share: :mod:`~.result`, the double differences (:mod:`~.double_difference`), the sigma of a carrier
-(:mod:`~.carrier_noise`) and the budget of false alarms (:mod:`~.false_alarm`).
+(:mod:`~.carrier_noise`), the budget of false alarms (:mod:`~.false_alarm`) and the table of what they measured
+(:mod:`~.monitor_table`). What baselines can see is in :mod:`~.gradient_detectability`.
 """
