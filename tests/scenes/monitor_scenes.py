@@ -18,7 +18,7 @@ from gbas_core.record import FloatArray
 from gbas_core.satellites import satellites_of
 from gbas_core.signals import L1, SPEED_OF_LIGHT_MPS
 from gbas_ground.channels import ephemerides
-from gbas_ground.channels.predicted_ranges import expected, site_of
+from gbas_ground.channels.predicted_ranges import predict_ranges, site_of
 from gbas_ground.channels.tracking import TrackGroup, initial_tracking, stack, track
 from gbas_ground.monitor_params import MonitorParams
 from gbas_ground.monitors.ionosphere_gradient import IonosphereGradientParams
@@ -90,9 +90,9 @@ def monitor_epochs(
             known, _ = ephemerides.receive(known, each, week, tow_s, params)
         known, changed, _ = ephemerides.choose(known, week, tow_s, params)
         raw = stack(observations, satellites_of(params.systems))
-        should = expected(known.current, week, tow_s, raw.code_m[:, L1], site)
-        less_clock = should.range_m - SPEED_OF_LIGHT_MPS * should.clock_s
-        old = expected(before, week, tow_s, raw.code_m[:, L1], site)
+        predicted = predict_ranges(known.current, week, tow_s, raw.code_m[:, L1], site)
+        less_clock = predicted.range_m - SPEED_OF_LIGHT_MPS * predicted.clock_s
+        old = predict_ranges(before, week, tow_s, raw.code_m[:, L1], site)
         shift = np.where(changed, old.range_m - SPEED_OF_LIGHT_MPS * old.clock_s - less_clock, 0.0)
         less_clock = np.where(changed, np.nan, less_clock)
         groups, tracks = track(groups, raw, key, less_clock, params)
@@ -103,7 +103,7 @@ def monitor_epochs(
         yield MonitorEpoch(
             key, raw.code_m, raw.carrier_m, raw.cn0_dbhz,
             np.repeat((tracks.age_s == 0.0)[:, np.newaxis], raw.code_m.shape[1], axis=1),
-            should.range_m, should.clock_s, should.elevation_rad, azimuths, shift,
+            predicted.range_m, predicted.clock_s, predicted.elevation_rad, azimuths, shift,
         )  # fmt: skip
 
 

@@ -313,8 +313,8 @@ def test_library(path):
             assert np.isfinite(observations.code_m[L1]).sum() >= 5
 
 
-def test_ten_scenarios():
-    assert len(SCENARIOS) == 10
+def test_eleven_scenarios():
+    assert len(SCENARIOS) == 11
 
 
 # --- threats show in the output

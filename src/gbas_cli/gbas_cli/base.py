@@ -15,7 +15,6 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from gbas_bringup.run_config import speed_of
 from gbas_core.errors import EXIT_BAD_INPUT, EXIT_INTERNAL, EXIT_INTERRUPTED, GbasError
 
 OUT = Path("out")
@@ -157,6 +156,8 @@ def print_places(places: dict[str, Path]) -> None:
 
 def speed_option(text: str) -> float:
     """Speed of a run, as an option of a command; see :func:`gbas_bringup.run_config.speed_of`."""
+    from gbas_bringup.run_config import speed_of
+
     try:
         return speed_of(text)
     except ValueError as error:
