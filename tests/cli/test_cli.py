@@ -12,7 +12,7 @@ import pytest
 import yaml
 from typer.testing import CliRunner
 
-from gbas_cli.base import describe, position_of, speed_of, spread_lists
+from gbas_cli.base import describe, position_of, speed_option, spread_lists
 from gbas_cli.main import app
 
 T3 = Path(__file__).resolve().parents[1] / "tables" / "vdb_vectors.yaml"
@@ -186,8 +186,8 @@ def test_process_takes_lists_in_both_ways(monkeypatch: pytest.MonkeyPatch, tmp_p
 
 
 def test_values_are_parsed() -> None:
-    assert speed_of("max") == 0.0
-    assert speed_of("2.5") == 2.5
+    assert speed_option("max") == 0.0
+    assert speed_option("2.5") == 2.5
     assert position_of("1,-2.5,3e6") == (1.0, -2.5, 3e6)
     assert "is not X,Y,Z" in fails("process", "--ground", "a", "--user", "u", "--nav", "n", "--ground-xyz", "1,2")
 
