@@ -22,7 +22,7 @@ from gbas_msgs_py.records import ChannelState
 
 BUDGET_S: Final = 2e-3
 SATELLITES_A_SYSTEM: Final = 20
-_MEASURED: Final = ("watch", "watch_sigmas")
+_MEASURED: Final = ("run_monitors", "monitor_sigmas")
 """The station's functions that run the monitors of signals and of B values."""
 
 
