@@ -14,6 +14,7 @@ pytest.importorskip("rclpy")
 from rclpy.serialization import serialize_message
 
 from gbas_bags.mcap_log import BagWriter, Topic
+from gbas_bench import monitors
 from gbas_bench.bench import PARTS, print_report, run_bench
 from gbas_bench.figures import Figure, Part, document, environment
 from gbas_bench.live import _settled, read_arrivals
@@ -24,6 +25,7 @@ from gbas_core.errors import GbasError
 from gbas_core.gnss.gpstime import epoch_key
 from gbas_core.gnss.observations import ObservationEpoch
 from gbas_core.satellites import IS_GPS
+from gbas_ground import station
 from gbas_msgs_py import ros, tables, topics
 from gbas_msgs_py.records import ProtectionEpoch
 from gbas_vdb.transmission.burst import Burst
@@ -138,3 +140,7 @@ def test_every_part_gives_figures(tmp_path, monkeypatch, data_dir):
     latency = next(part for part in report["parts"] if part["part"] == "latency")
     assert latency["details"]["lost"] == 0
     assert json.loads((tmp_path / "out" / "bench.json").read_text()) == report
+
+
+def test_the_monitors_are_timed_by_names_the_station_has():
+    assert all(callable(getattr(station, name)) for name in monitors._MEASURED)
