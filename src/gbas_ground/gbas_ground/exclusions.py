@@ -1,4 +1,4 @@
-"""The executive: who is excluded, why, and when use may begin again.
+"""Exclusions: who is excluded, why, and when use may begin again.
 
 Channels (receiver and satellite), satellites and receivers each have a :class:`Latch`. A monitor's failure sets it. It
 opens again only after the re-admission time in which every monitor that applies was seen to pass: an epoch in which
