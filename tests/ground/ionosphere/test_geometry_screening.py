@@ -200,6 +200,37 @@ def test_a_rise_of_sigma_vig_counts_when_every_aircraft_has_it():
     assert back.sigma_vig == full.sigma_vig
 
 
+def test_after_a_short_interruption_aircraft_may_still_have_the_sigma_vig_of_before():
+    params = station(affected=1, max_missing=0, aircraft_systems=["GE"])
+    sent, sky = sky_of(params)
+    state, full = protect(initial_ionosphere(), 0, sent, sky, params)
+    few, little = sky_of(params, ("G01", "G06", "G08"))
+    state, nothing = protect(state, 1_000, few, little, params)
+    assert nothing.sigma_vig == MAX_SIGMA_VIG
+    fewer, less = sky_of(params, ("G06", "G08", "G12", "G16", "G21", "E01", "E07", "E15"))
+    soon, at_once = protect(state, 5_000, fewer, less, params)
+    assert at_once.sigma_vig > full.sigma_vig
+    assert soon.credited_vig == full.sigma_vig
+    assert at_once.factor > 0.0
+    later, fresh = protect(state, 61_000, fewer, less, params)
+    assert later.credited_vig == fresh.sigma_vig
+    assert fresh.factor < at_once.factor
+
+
+def test_the_multiplier_is_the_least_any_aircraft_may_use():
+    """One receiver has a larger one than two, but an aircraft takes that of the most behind a satellite it has."""
+    params = station()
+    sent, sky = sky_of(params)
+    mixed = sky.receivers.copy()
+    mixed[SAT_INDEX["G01"]] = 1.0
+    places = np.flatnonzero(sent)
+    multipliers = [
+        cases_of(places, sky._replace(receivers=each), params).k_ffmd
+        for each in (sky.receivers, mixed, np.where(sent, 1.0, np.nan), np.where(sent, 2.0, np.nan))
+    ]
+    assert multipliers == pytest.approx([5.847, 5.847, 6.86, 5.762], abs=5e-4)  # ICAO Annex 10, table B-67
+
+
 def test_a_type_d_station_keeps_its_other_sigmas():
     params = station()
     sent, sky = sky_of(params)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -81,9 +81,9 @@ class IonosphereState:
     satellites : (N,) array
         Receivers behind each satellite screened; 0 where it was not.
     renewed_key : int
-        Epoch of the last renewal [ms].
+        Epoch of the last renewal, or at which the service was interrupted [ms].
     credited_vig : float
-        sigma_vig that every aircraft has [m/m].
+        sigma_vig that every aircraft has at least [m/m].
     protection : Protection or None
         None before the first screening.
     """
@@ -117,15 +117,18 @@ def protect(
     if not params.ionosphere.protects:
         return state, Protection(sigma_vig=params.sigma_vert_iono_gradient, shape_m=np.zeros(N_SATS))
     if np.count_nonzero(sent) < MIN_SERVICE_SATELLITES:  # nobody has a position; the most cautious values
-        return initial_ionosphere(), Protection(sigma_vig=MAX_SIGMA_VIG, shape_m=np.zeros(N_SATS))
+        return _interrupted(state, key), Protection(sigma_vig=MAX_SIGMA_VIG, shape_m=np.zeros(N_SATS))
     before = state.protection
-    renew = before is None or key - state.renewed_key >= round(1000.0 * params.ionosphere.renewal_s)
+    elapsed = key - state.renewed_key >= round(1000.0 * params.ionosphere.renewal_s)
+    renew = before is None or elapsed
     satellites = np.where(sent, sky.receivers, 0.0)
     if before is not None and not renew and bool((satellites == state.satellites).all()):
         return state, before
     screening = _Screening.of(sent, sky, params)
     if before is None:
         sigma_vig = credited = screening.least_vig(MAX_SIGMA_VIG)
+        if not elapsed:  # after a short interruption an aircraft may have what was sent before it
+            credited = float(np.fmin(credited, state.credited_vig))
     elif renew:
         sigma_vig = screening.least_vig(before.sigma_vig)
         credited = min(sigma_vig, before.sigma_vig)
@@ -145,6 +148,14 @@ def protect(
         protection=protection,
     )
     return new, protection
+
+
+def _interrupted(state: IonosphereState, key: int) -> IonosphereState:
+    """Without a service everything is forgotten but the sigma_vig that aircraft may still have, and when it ended."""
+    if state.protection is None:
+        return state
+    credited = float(np.fmin(state.credited_vig, state.protection.sigma_vig))
+    return replace(initial_ionosphere(), renewed_key=key, credited_vig=credited)
 
 
 def changes(before: Protection | None, now: Protection) -> Iterator[tuple[str, float, float]]:
@@ -256,7 +267,6 @@ def cases_of(satellites: NDArray[np.int64], sky: Sky, params: GroundParams) -> C
     )
     speed, slant = places.speed_mps[:, np.newaxis], places.slant_m[:, np.newaxis]
     error = range_errors_m(places, elevation, azimuth, section.threat(), params.tau_s[0])
-    fewest = int(receivers.min())
     return Cases(
         los=places.los_axes @ up,
         tan_gpa=places.tan_gpa,
@@ -267,11 +277,16 @@ def cases_of(satellites: NDArray[np.int64], sky: Sky, params: GroundParams) -> C
         shape_m=error[places.decision].max(axis=0),
         limit_m=places.limit_m,
         tolerable_m=places.tolerable_m,
-        k_ffmd=K_FFMD_SINGLE if fewest < 2 else k_ffmd(fewest),
+        k_ffmd=_least_k_ffmd(receivers),
         k_noise=section.k_noise,
         nominal_vig=params.sigma_vert_iono_gradient,
         affected=section.affected,
     )
+
+
+def _least_k_ffmd(receivers: FloatArray) -> float:
+    """The smallest multiplier an aircraft may use, which goes by the most receivers behind any satellite it has."""
+    return min(K_FFMD_SINGLE if count < 2 else k_ffmd(count) for count in map(int, np.unique(receivers)))
 
 
 def protection_in_words(params: GroundParams) -> str:

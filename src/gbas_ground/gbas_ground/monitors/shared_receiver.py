@@ -34,6 +34,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from gbas_core.models.error_models import IONO_EARTH_RADIUS_M, IONO_SHELL_HEIGHT_M
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.signals import IONO_RATIO, WAVELENGTH_M
 from gbas_ground.monitors.double_difference import Baselines, DoubleDifferences
@@ -45,8 +46,6 @@ _SHARE: Final = 0.5  # of the threshold: half is more than three sigmas
 _MARGIN: Final = 2.0  # over what a plane could do, for the noise
 _ACROSS_M: Final = 50.0e3  # pierce points within such a strip may be along one edge; a hundred times a baseline
 _LARGEST: Final = 600.0e-6  # gradient whose whole wavelengths are reckoned with [m/m]; threat models end at 425 mm/km
-_SHELL_M: Final = 350.0e3
-_EARTH_RADIUS_M: Final = 6_371_000.0
 _OTHERS: Final = 3  # baselines of the three receivers that have to agree
 _DIRECTIONS: Final = 36
 _IN_A_LINE: Final = 1e3  # condition of places in kilometres
@@ -173,8 +172,9 @@ def seen_quiet(
 def across_m(elevation_rad: FloatArray, azimuth_rad: FloatArray) -> float:
     """Width of the narrowest strip that holds the pierce points of satellites [m]; 0 for two."""
     angle = 0.5 * np.pi - elevation_rad
-    angle = angle - np.arcsin(np.cos(elevation_rad) * _EARTH_RADIUS_M / (_EARTH_RADIUS_M + _SHELL_M))
-    away_m = (_EARTH_RADIUS_M + _SHELL_M) * angle
+    shell_m = IONO_EARTH_RADIUS_M + IONO_SHELL_HEIGHT_M
+    angle = angle - np.arcsin(np.cos(elevation_rad) * IONO_EARTH_RADIUS_M / shell_m)
+    away_m = shell_m * angle
     east, north = away_m * np.sin(azimuth_rad), away_m * np.cos(azimuth_rad)
     if east.size < _OTHERS:
         return 0.0
