@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import NamedTuple
@@ -54,7 +54,7 @@ from gbas_ground.ionosphere.protection import (
 from gbas_ground.long_term import initial_long_term, monitor_sigmas
 from gbas_ground.monitoring import MonitoringResult, MonitoringState, MonitorInputs, initial_monitoring, run_monitors
 from gbas_ground.monitors.expected_range import check_expected_range
-from gbas_ground.monitors.monitor_table import monitor_epoch, summarise
+from gbas_ground.monitors.monitor_table import MonitorSummary, monitor_epoch, summarise
 from gbas_ground.monitors.result import MonitorResult
 from gbas_ground.monitors.sigma_monitor import SigmaMonitorState
 from gbas_ground.monitors.signal_power import check_signal_power
@@ -312,62 +312,28 @@ def _process(
     _receiver_events(state, raw, events)
     exclusions = _released(state.exclusions, params, events)
 
-    observed, new_exclusions = _track_channels(state, epoch, raw, known, changed, exclusions, params, events)
-    inputs = _monitor_inputs(state, epoch, observed, known, new_exclusions, changed, dt_s, params)
-    monitoring, monitor_output = run_monitors(state.monitoring, inputs, params)
-    new_exclusions = _exclude_channels(new_exclusions, monitor_output.channels, events)
-    new_exclusions = _exclude_receivers(
-        new_exclusions, monitor_output.receivers, ExclusionCause.RECEIVER_BASELINES, events
-    )
-    new_exclusions, noticed = _exclude_satellites(new_exclusions, monitor_output)
-    correction_inputs = _correction_inputs(state, observed, monitor_output, known, changed, dt_s, params)
-    corrections, new_exclusions, findings = resolve_consistency(correction_inputs, new_exclusions, params)
-    long_term, new_exclusions, slow, long_term_summaries = monitor_sigmas(
-        state.long_term, corrections, new_exclusions, dt_s, params
-    )
-    findings = (*noticed, *findings, *slow)
-    events.found(findings)
-    new_exclusions = _advanced(
-        new_exclusions, correction_inputs, corrections, observed.channel_ok, monitor_output, dt_s, params
-    )
-
-    status = satellite_status(
-        observed.tracked, observed.tracks, known, correction_inputs, corrections, new_exclusions, params
-    )
+    observed, exclusions = _track_channels(state, epoch, raw, known, changed, exclusions, params, events)
+    judged = _judge(state, epoch, observed, known, changed, exclusions, dt_s, params, events)
+    inputs, corrections = judged.correction_inputs, judged.corrections
+    events.found(judged.findings)
+    status = satellite_status(observed.tracked, observed.tracks, known, inputs, corrections, judged.exclusions, params)
     ionosphere, protection, status = _protect(state, key, status, corrections, observed.predicted, params, events)
-    integrity = integrity_of(
-        epoch.gps_week,
-        epoch.tow_s,
-        known,
-        correction_inputs,
-        corrections,
-        status,
-        monitor_output.orbit_bound,
-        protection,
-        params,
-    )
+    time, bound = (epoch.gps_week, epoch.tow_s), judged.monitor_output.orbit_bound
+    integrity = integrity_of(*time, known, inputs, corrections, status, bound, protection, params)
     channels = channel_epoch(
-        epoch.gps_week,
-        epoch.tow_s,
-        observed.tracked,
-        observed.tracks,
-        correction_inputs,
-        corrections,
-        status,
-        new_exclusions,
-        state.channels,
+        *time, observed.tracked, observed.tracks, inputs, corrections, status, judged.exclusions, state.channels
     )
-    serving = bool((status.state == ChannelState.USABLE).any())
-    contributing = (corrections.used & (status.state == ChannelState.USABLE)).any(axis=1)
-    _contribution_events(state, contributing, raw, new_exclusions, events)
-    _satellite_events(state, status, serving, findings, events)
+    usable = status.state == ChannelState.USABLE
+    serving, contributing = bool(usable.any()), (corrections.used & usable).any(axis=1)
+    _contribution_events(state, contributing, raw, judged.exclusions, events)
+    _satellite_events(state, status, serving, judged.findings, events)
     new = IntegrityState(
         key=key,
         refused=0,
         refused_key=0,
         ephemerides=known,
         tracking=observed.tracking,
-        exclusions=new_exclusions,
+        exclusions=judged.exclusions,
         previous=_previous_epoch(epoch, observed),
         satellites=status.state,
         causes=status.cause,
@@ -375,17 +341,81 @@ def _process(
         contributing=contributing,
         serving=serving,
         channels=channels,
-        monitoring=monitoring,
-        long_term=long_term,
+        monitoring=judged.monitoring,
+        long_term=judged.long_term,
         ionosphere=ionosphere,
     )
-    checks = zip(("range", "power"), observed.checks, strict=True)
-    summaries = {name: summarise(result, observed.tracked) for name, (_, result) in checks}
-    summaries |= {**monitor_output.summaries, **consistency_summaries(corrections, params), **long_term_summaries}
-    statistics = monitor_epoch(
-        epoch.gps_week, epoch.tow_s, summaries, monitor_output.details, np.isfinite(integrity.state)
-    )
+    statistics = monitor_epoch(*time, judged.summaries, judged.monitor_output.details, np.isfinite(integrity.state))
     return new, Monitored(integrity=integrity, statistics=statistics, channels=channels, events=events.all())
+
+
+class _Judged(NamedTuple):
+    """What the monitors leave of one epoch.
+
+    Attributes
+    ----------
+    monitoring : MonitoringState
+    monitor_output : MonitoringResult
+        Monitors of signals.
+    correction_inputs : CorrectionInputs
+    corrections : Corrections
+        Those that agree.
+    exclusions : Exclusions
+        With this epoch's.
+    long_term : SigmaMonitorState
+    summaries : mapping from a monitor's name to MonitorSummary
+    findings : tuple of Finding
+        Satellites, channels and receivers that were excluded, and why.
+    """
+
+    monitoring: MonitoringState
+    monitor_output: MonitoringResult
+    correction_inputs: CorrectionInputs
+    corrections: Corrections
+    exclusions: Exclusions
+    long_term: SigmaMonitorState
+    summaries: Mapping[str, MonitorSummary]
+    findings: tuple[Finding, ...]
+
+
+def _judge(
+    state: IntegrityState,
+    epoch: GroundEpoch,
+    observed: _TrackedEpoch,
+    known: EphemerisState,
+    changed: BoolArray,
+    exclusions: Exclusions,
+    dt_s: float,
+    params: GroundParams,
+    events: EventLog,
+) -> _Judged:
+    """Run the monitors, exclude what fails, form corrections of the rest until they agree."""
+    given = _monitor_inputs(state, epoch, observed, known, exclusions, changed, dt_s, params)
+    monitoring, monitor_output = run_monitors(state.monitoring, given, params)
+    exclusions = _exclude_channels(exclusions, monitor_output.channels, events)
+    exclusions = _exclude_receivers(exclusions, monitor_output.receivers, ExclusionCause.RECEIVER_BASELINES, events)
+    exclusions, of_signals = _exclude_satellites(exclusions, monitor_output)
+    inputs = _correction_inputs(state, observed, monitor_output, known, changed, dt_s, params)
+    corrections, exclusions, of_corrections = resolve_consistency(inputs, exclusions, params)
+    long_term, exclusions, of_sigmas, sigma_summaries = monitor_sigmas(
+        state.long_term, corrections, exclusions, dt_s, params
+    )
+    checks = zip(("range", "power"), observed.checks, strict=True)
+    return _Judged(
+        monitoring=monitoring,
+        monitor_output=monitor_output,
+        correction_inputs=inputs,
+        corrections=corrections,
+        exclusions=_advanced(exclusions, inputs, corrections, observed.channel_ok, monitor_output, dt_s, params),
+        long_term=long_term,
+        summaries={
+            **{name: summarise(result, observed.tracked) for name, (_, result) in checks},
+            **monitor_output.summaries,
+            **consistency_summaries(corrections, params),
+            **sigma_summaries,
+        },
+        findings=(*of_signals, *of_corrections, *of_sigmas),
+    )
 
 
 class _TrackedEpoch(NamedTuple):
