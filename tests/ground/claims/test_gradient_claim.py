@@ -9,7 +9,7 @@ import pytest
 
 from gbas_core.parameters import ParameterError
 from gbas_core.signals import L1
-from gbas_ground.claims.gradient_claim import coverage_by_elevation, gradient_claim
+from gbas_ground.claims.gradient_claim import MAX_M_EIG, MAX_Y_EIG_M, coverage_by_elevation, gradient_claim
 from gbas_ground.monitors.carrier_noise import CarrierNoise
 from gbas_ground.monitors.gradient_detectability import BaselineMonitor, coverage_percent
 from gbas_ground.monitors.ionosphere_gradient import IonosphereGradientParams, gradient_site
@@ -106,8 +106,11 @@ def test_smaller_bounds_are_refused_by_name(count: int, sections: dict, expected
     ],
     ids=["largest", "full coverage", "range begins at 500", "range ends at 600"],
 )
-def test_supported_bounds_are_accepted(count: int, sections: dict) -> None:
-    braunschweig_station(count, **sections)
+def test_supported_bounds_are_accepted_as_given(count: int, sections: dict) -> None:
+    station = braunschweig_station(count, **sections)
+    given = sections["gast_d"]
+    assert station.y_eig_m == given.get("y_eig_m", MAX_Y_EIG_M)
+    assert station.m_eig == given.get("m_eig", MAX_M_EIG)
 
 
 def test_claims_without_type_d_are_not_looked_at() -> None:

@@ -233,5 +233,5 @@ def test_smaller_p_is_refused_by_name(count: int, sections: dict, expected: str)
         (1, {"p": 1.5e-4, "external_monitor": "network of reference stations"}),
     ],
 )
-def test_supported_or_declared_p_is_accepted(count: int, ephemeris: dict) -> None:
-    braunschweig_station(count, ephemeris=ephemeris)
+def test_supported_or_declared_p_is_accepted_as_given(count: int, ephemeris: dict) -> None:
+    assert braunschweig_station(count, ephemeris=ephemeris).p_ephemeris == ephemeris.get("p", 0.0)

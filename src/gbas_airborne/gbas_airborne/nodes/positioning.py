@@ -49,6 +49,7 @@ class Positioning(GbasNode):
             self.when_ready(partial(self.step, each))
 
     def step(self, joined: AirborneInput[ObservationEpoch]) -> None:
+        """One epoch: position from the observations and the bursts that came with them."""
         if joined.timed_out:
             self.problem("no VDB frame in time")
         week, tow_s = from_epoch_key(joined.key)

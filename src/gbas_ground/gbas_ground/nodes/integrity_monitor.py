@@ -45,6 +45,7 @@ class IntegrityMonitor(GbasNode):
             self.when_ready(partial(self.step, epoch))
 
     def step(self, joined: JoinedEpoch[ObservationEpoch]) -> None:
+        """One epoch: corrections and monitors from the observations of all receivers that came in time."""
         for receiver in joined.timed_out:
             self.problem(f"no epoch from {receiver} in time")
         week, tow_s = from_epoch_key(joined.key)
