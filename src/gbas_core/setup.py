@@ -16,6 +16,6 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         (f"share/{PACKAGE}", ["package.xml"]),
     ],
-    install_requires=["numba", "numpy", "scipy", "sidereon"],
+    install_requires=["numba", "numpy", "pydantic", "PyYAML", "scipy", "sidereon"],
     zip_safe=True,
 )

@@ -1,63 +1,143 @@
-"""Node parameters from dataclasses."""
+"""One declaration: values from Python and from files, what is refused and in which words, schema, what is declared."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+import math
+from dataclasses import FrozenInstanceError, replace
+from typing import Annotated, Any, Literal
 
 import pytest
 
-from gbas_core.parameters import ParameterError, parameters_from, require
+from gbas_core.parameters import (
+    Parameter,
+    ParameterError,
+    declared,
+    from_mapping,
+    json_schema,
+    nested,
+    parameters,
+    to_mapping,
+)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Example:
-    flag: bool = False
-    count: int = 3
-    rate: float = 1.5
-    name: str = "x"
-    files: tuple[str, ...] = ()
-    numbers: tuple[float, ...] = ()
+@parameters
+class Filters:
+    """Filters."""
+
+    exclude: Annotated[bool, Parameter("satellites that fail are excluded")] = True
+    tau_s: Annotated[float, Parameter("time constant", "s", 1.0, 1000.0)] = 30.0
+    mask_rad: Annotated[float, Parameter("lowest elevation", "deg", 0.0, 90.0)] = math.radians(5.0)
+    nodes_rad: Annotated[tuple[float, ...], Parameter("nodes", "deg", 0.0, 90.0)] = ()
+    form: Annotated[Literal["full_rank", "published"], Parameter("form of the test")] = "full_rank"
+    points: Annotated[int, Parameter("points of a fit", "-", 1, 10)] = 3
+    natural: Annotated[tuple[float, float], Parameter("of step and rate", "m", 0.0, 1.0)] = (0.1, 0.2)
+    limit_m: Annotated[float | None, Parameter("limit, if any", "m", 0.0, 9.0)] = None
 
     def __post_init__(self) -> None:
-        require("rate", self.rate, 0.0 <= self.rate < 10.0, "0 to 10")
+        if self.points == 7:
+            raise ParameterError("points = 7 is odd")
 
 
-def test_defaults_are_those_of_the_dataclass() -> None:
-    assert parameters_from(Example, {}) == Example()
+@parameters
+class Station:
+    """A station."""
+
+    name: Annotated[str, Parameter("name of the station")]
+    filters: Filters = Filters()
 
 
-def test_values_come_over_defaults_with_their_types() -> None:
-    made = parameters_from(Example, {"rate": 2, "files": ["a", "b"], "numbers": [1, 2.5], "flag": True})
-    assert made == Example(rate=2.0, files=("a", "b"), numbers=(1.0, 2.5), flag=True)
-    assert isinstance(made.rate, float)
-    assert isinstance(made.numbers[0], float)
-
-
-@pytest.mark.parametrize("empty", [None, [], [""]])
-def test_an_empty_list_has_several_spellings_in_ros(empty: Any) -> None:
-    assert parameters_from(Example, {"files": empty}).files == ()
+def station(**mapping: Any) -> Station:
+    return from_mapping(Station, mapping, source="site.yaml", section="ground")
 
 
 @pytest.mark.parametrize(
-    ("values", "complaint"),
+    ("values", "words"),
     [
-        ({"raet": 1.0}, "parameter 'raet' is unknown; did you mean 'rate'?"),
-        ({"zzz": 1.0}, "parameter 'zzz' is unknown; known are count, files, flag"),
-        ({"rate": -1.0}, "parameter 'rate' is -1.0, expected 0 to 10"),
-        ({"rate": float("nan")}, "parameter 'rate' is nan"),
-        ({"rate": "fast"}, "parameter 'rate' is 'fast', expected a number"),
-        ({"rate": True}, "parameter 'rate' is True, expected a number"),
-        ({"count": 3.0}, "parameter 'count' is 3.0, expected a whole number"),
-        ({"count": True}, "parameter 'count' is True"),
-        ({"flag": 1}, "parameter 'flag' is 1, expected true or false"),
-        ({"name": 5}, "parameter 'name' is 5, expected a text"),
-        ({"files": "a"}, "parameter 'files' is 'a', expected a list"),
-        ({"files": [1]}, "parameter 'files' is 1, expected a text"),
-        ({"numbers": ["a"]}, "parameter 'numbers' is 'a', expected a number"),
+        ({"tau_s": 2000.0}, "tau_s = 2000.0 is not within 1 to 1000 s"),
+        ({"tau_s": "3"}, "tau_s = '3' is not a number"),
+        ({"tau_s": True}, "tau_s = True is not a number"),
+        ({"tau_s": math.nan}, "tau_s = nan is not a finite number"),
+        ({"tau_s": math.inf}, "tau_s = inf is not a finite number"),
+        ({"points": 2.5}, "points = 2.5 is not a whole number"),
+        ({"points": True}, "points = True is not a whole number"),
+        ({"points": 7}, "points = 7 is odd"),
+        ({"exclude": 1}, "exclude = 1 is not true or false"),
+        ({"form": "x"}, "form = 'x' is not one of 'full_rank', 'published'"),
+        ({"natural": (0.1,)}, "natural = (0.1,) has not the right number of values"),
+        ({"natural": (0.1, 3.0)}, "natural = 3.0 is not within 0 to 1 m"),
+        ({"limit_m": 10.0}, "limit_m = 10.0 is not within 0 to 9 m"),
+        ({"tau": 3.0}, "tau is unknown; did you mean 'tau_s'?"),
+        ({"mask_deg": 3.0}, "mask_deg is unknown; did you mean 'mask_deg'?"),  # from Python it is mask_rad
     ],
 )
-def test_refusals_name_parameter_value_and_bound(values: dict[str, Any], complaint: str) -> None:
-    with pytest.raises(ParameterError) as told:
-        parameters_from(Example, values)
-    assert str(told.value).startswith(complaint)
+def test_what_is_wrong_is_named(values: dict[str, Any], words: str) -> None:
+    with pytest.raises(ParameterError) as caught:
+        Filters(**values)
+    assert str(caught.value) == words
+
+
+def test_messages_speak_in_the_units_of_files() -> None:
+    with pytest.raises(ParameterError, match=r"^mask_deg = 114\.59\d* is not within 0 to 90 deg$"):
+        Filters(mask_rad=2.0)
+
+
+@pytest.mark.parametrize(
+    ("mapping", "words"),
+    [
+        ({}, "ground.name is missing (name of the station)"),
+        ({"name": "A", "filters": {"mask_deg": 95}}, "ground.filters.mask_deg = 95.0 is not within 0 to 90 deg"),
+        ({"name": "A", "filters.nodes_deg": [10, 200]}, "ground.filters.nodes_deg = 200.0 is not within 0 to"),
+        ({"name": "A", "filters": {"mask_rad": 1}}, "ground.filters.mask_rad is unknown; did you mean 'mask_deg'?"),
+        ({"name": "A", "filter": {}}, "ground.filter is unknown; did you mean 'filters'?"),
+        ({"name": "A", "filters": 3}, "ground.filters = 3 is not a section of keys"),
+        ({"name": "A", "filters": {"points": 7}}, "ground.filters: points = 7 is odd"),
+        ({"name": 1}, "ground.name = 1 is not a text"),
+    ],
+)  # fmt: skip
+def test_files_are_named_with_section_and_key(mapping: dict[str, Any], words: str) -> None:
+    with pytest.raises(ParameterError) as caught:
+        station(**mapping)
+    assert str(caught.value).startswith(f"site.yaml: {words}")
+
+
+def test_angles_are_degrees_in_files_and_radians_inside() -> None:
+    made = station(name="A", filters={"mask_deg": 264.73e-1, "nodes_deg": [10, 20.5]})
+    assert made.filters.mask_rad == math.radians(264.73e-1)
+    assert made.filters.nodes_rad == (math.radians(10.0), math.radians(20.5))
+    assert to_mapping(made)["filters"]["mask_deg"] == 264.73e-1
+    assert from_mapping(Station, to_mapping(made)) == made
+
+
+def test_keys_may_be_dotted_and_an_empty_ros_list_is_empty() -> None:
+    assert station(**{"name": "A", "filters.tau_s": 40, "filters.nodes_deg": [""]}).filters.tau_s == 40.0
+    assert nested({"a": {"b": 1}, "a.c": 2, "a.b": 3}) == {"a": {"b": 3, "c": 2}}
+
+
+def test_sets_are_frozen_and_checked_again_when_changed() -> None:
+    made = Filters()
+    assert replace(made, tau_s=40.0) != made
+    assert hash(replace(made)) == hash(made)
+    with pytest.raises(FrozenInstanceError):
+        made.tau_s = 40.0  # type: ignore[misc]
+    with pytest.raises(ParameterError, match="tau_s"):
+        replace(made, tau_s=0.0)
+
+
+def test_what_is_declared_comes_with_values_in_the_units_of_files() -> None:
+    found = {each.key: each for each in declared(station(name="A"))}
+    assert found["filters.mask_deg"].value == 5.0
+    assert found["filters.mask_deg"].parameter.unit == "deg"
+    assert found["filters.tau_s"].kind is float
+    assert {each.key for each in declared(Station)} == set(found)
+
+
+def test_json_schema_has_bounds_units_and_defaults_of_files() -> None:
+    schema = json_schema(Station)
+    filters = schema["$defs"]["Filters"]["properties"]
+    assert filters["mask_deg"] == {
+        "type": "number", "minimum": 0.0, "maximum": 90.0, "default": 5.0, "description": "lowest elevation [deg]",
+    }  # fmt: skip
+    assert filters["nodes_deg"]["items"] == {"type": "number", "minimum": 0.0, "maximum": 90.0}
+    assert filters["form"]["enum"] == ["full_rank", "published"]
+    assert schema["required"] == ["name"]
+    assert schema["additionalProperties"] is False

@@ -1,24 +1,424 @@
-"""Node parameters from frozen dataclasses: defaults are read from them, values are checked against their types.
+"""Parameters: declared once, as fields of frozen dataclasses, for files, ROS, errors and documentation.
 
-A field is a ``bool``, ``int``, ``float``, ``str``, ``tuple[str, ...]`` or ``tuple[float, ...]``; its bounds are checked
-by the dataclass itself (``__post_init__``), which raises :class:`ParameterError`.
+A set of parameters is a class under :func:`parameters`; each field is annotated with a :class:`Parameter`, which says
+what it means, its unit and its bounds. Sets may hold others as fields: these are the sections of a file::
+
+    @parameters
+    class CcdParams:
+        tau_s: Annotated[float, Parameter("time constant of both filters", "s", 1.0, 1000.0)] = 30.0
+        mask_rad: Annotated[float, Parameter("lowest elevation", "deg", 0.0, 90.0)] = 0.1
+
+Conventions: a field has the key of its name in a file, and SI units. Only angles differ: they are radians in the field
+``mask_rad`` and degrees under the key ``mask_deg``; unit and bounds of their declaration are those of the file.
+
+Values are checked when a set is made, from Python or from a file, by pydantic: the kind exactly (a whole number will do
+for a float), bounds, no NaN, no infinity, no unknown key. What is wrong is told by a :class:`ParameterError` that names
+key, value and bound in the file's unit.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import difflib
+import functools
+import math
 import typing
-from collections.abc import Iterable, Mapping
-from typing import Any, Final, TypeVar
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import partial
+from typing import Any, Final, TypeVar, dataclass_transform
+
+import pydantic.dataclasses
+import pydantic_core
+from pydantic import ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler, TypeAdapter, ValidationError
+from pydantic.json_schema import GenerateJsonSchema
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 P = TypeVar("P")
 
-_KINDS: Final = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
+_ANGLES: Final = (("_rad", "_deg"), ("_radps", "_degps"))
+_FROM_FILE: Final = {"from_file": True}
+_OUT_OF_BOUNDS: Final = "out_of_bounds"
+_KINDS: Final = {
+    "float_type": "is not a number",
+    "float_parsing": "is not a number",
+    "finite_number": "is not a finite number",
+    "int_type": "is not a whole number",
+    "int_from_float": "is not a whole number",
+    "int_parsing": "is not a whole number",
+    "bool_type": "is not true or false",
+    "bool_parsing": "is not true or false",
+    "string_type": "is not a text",
+    "tuple_type": "is not a list",
+    "dict_type": "is not a section of keys",
+    "mapping_type": "is not a section of keys",
+    "dataclass_type": "is not a section of keys",
+}
+_UNKNOWN: Final = ("unexpected_keyword_argument", "extra_forbidden")
+_MISSING: Final = ("missing", "missing_keyword_only_argument", "missing_argument")
 
 
 class ParameterError(ValueError):
-    """A parameter that is unknown, of the wrong type, or out of bounds; the text names it, its value and the bound."""
+    """A parameter that is unknown, missing, of the wrong kind or out of bounds; the text names it and its value."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Parameter:
+    """What a field means, its unit and its bounds, for ``Annotated``.
+
+    Attributes
+    ----------
+    doc : str
+        What it means.
+    unit : str
+        Unit in a file; ``"-"`` for numbers without one, texts and flags.
+    low, high : float or None
+        Bounds in that unit, both allowed; of each value of a list. None: there is no bound.
+    """
+
+    doc: str
+    unit: str = "-"
+    low: float | None = None
+    high: float | None = None
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Lists become tuples and angles of files radians; then the exact kinds, then the bounds."""
+        inner = core_schema.with_info_before_validator_function(self._in_own_units, _strict(handler(source)))
+        return core_schema.no_info_after_validator_function(self._within, inner)
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        found = _bounded(handler.resolve_ref_schema(handler(schema)), self.low, self.high)
+        found["description"] = self.doc if self.unit == "-" else f"{self.doc} [{self.unit}]"
+        return found
+
+    @property
+    def per_unit(self) -> float:
+        """The field's value of one unit of the file: radians of a degree, else 1."""
+        return math.pi / 180.0 if self.unit in ("deg", "deg/s") else 1.0
+
+    def in_file_units(self, value: Any) -> Any:
+        """A value as it stands in a file."""
+        if isinstance(value, tuple):
+            return tuple(self.in_file_units(each) for each in value)
+        if self.per_unit == 1.0 or isinstance(value, bool) or not isinstance(value, (int, float)):
+            return value
+        # The shortest number of degrees that is these radians: 264.73, not 264.73000000000002.
+        exact = value / self.per_unit
+        short = round(exact, 12)
+        return short if short * self.per_unit == value else exact
+
+    def _in_own_units(self, value: Any, info: core_schema.ValidationInfo[Any]) -> Any:
+        from_file = info.context is not None and info.context.get("from_file", False)
+        return self._converted(value, self.per_unit if from_file else 1.0)
+
+    def _converted(self, value: Any, factor: float) -> Any:
+        if hasattr(value, "__iter__") and not isinstance(value, str | bytes | Mapping):
+            values = tuple(value)
+            # ROS writes an empty list as a list of one empty text.
+            return () if values in (("",), (b"",)) else tuple(self._converted(each, factor) for each in values)
+        number = isinstance(value, (int, float)) and not isinstance(value, bool)
+        return float(value) * factor if number and factor != 1.0 else value
+
+    def _within(self, value: Any) -> Any:
+        for each in _numbers(value):
+            shown = self.in_file_units(each)
+            low = -math.inf if self.low is None else self.low
+            high = math.inf if self.high is None else self.high
+            tolerance = 0.0 if self.per_unit == 1.0 else 1e-12 * max(abs(low), abs(high))  # of the conversion
+            if not low - tolerance <= shown <= high + tolerance:
+                raise PydanticCustomError(
+                    _OUT_OF_BOUNDS,
+                    "{shown} is not {bounds}",
+                    {"shown": f"{shown!r}", "bounds": self.bounds()},
+                )
+        return value
+
+    def bounds(self) -> str:
+        """Bounds and unit in words."""
+        unit = "" if self.unit == "-" else f" {self.unit}"
+        if self.high is None:
+            return f"{self.low:g}{unit} or more"
+        return f"within {self.low:g} to {self.high:g}{unit}" if self.low is not None else f"{self.high:g}{unit} or less"
+
+
+@dataclass_transform(kw_only_default=True, frozen_default=True)
+def parameters(cls: type[P]) -> type[P]:
+    """A frozen dataclass whose values are checked when it is made; see the module.
+
+    Checks that concern several fields go into ``__post_init__``, and raise :class:`ParameterError` or ValueError.
+
+    Raises
+    ------
+    ParameterError
+        By the class, when it is made of values that it refuses.
+    """
+    config = ConfigDict(
+        extra="forbid", allow_inf_nan=False, alias_generator=file_key, validate_by_name=True, validate_by_alias=False
+    )
+    made: type[Any] = pydantic.dataclasses.dataclass(frozen=True, kw_only=True, config=config)(cls)
+    original = made.__init__
+
+    @functools.wraps(original)
+    def checked(self: Any, *args: Any, **kwargs: Any) -> None:
+        try:
+            original(self, *args, **kwargs)
+        except ValidationError as error:
+            raise _explained(made, error) from None
+
+    made.__init__ = checked
+    return made
+
+
+# --- files
+
+
+def file_key(name: str) -> str:
+    """Key of a field in a file."""
+    for own, in_files in _ANGLES:
+        if name.endswith(own):
+            return name.removesuffix(own) + in_files
+    return name
+
+
+def from_mapping(kind: type[P], mapping: Mapping[str, Any], *, source: str = "", section: str = "") -> P:
+    """A set of parameters from the keys of a file or of ROS parameters.
+
+    Parameters
+    ----------
+    kind : type
+        Class under :func:`parameters`.
+    mapping : mapping
+        Sections of keys; keys may be dotted (``ccd.tau_s``).
+    source, section : str
+        Where the mapping came from and the section it is, for messages.
+
+    Raises
+    ------
+    ParameterError
+        Naming source, key, value and bound.
+    """
+    try:
+        found: P = _adapter(kind).validate_python(nested(mapping), by_alias=True, by_name=False, context=_FROM_FILE)
+    except (ValidationError, ParameterError) as error:
+        problem = _explained(kind, error, section) if isinstance(error, ValidationError) else error
+        raise ParameterError(f"{source}: {problem}" if source else str(problem)) from None
+    return found
+
+
+def to_mapping(params: Any) -> dict[str, Any]:
+    """Keys and values as a file has them, sections within sections."""
+    return nested({each.key: each.value for each in declared(params)})
+
+
+def nested(mapping: Mapping[str, Any]) -> dict[str, Any]:
+    """Dotted keys as sections; of a key and a section of the same name the later counts.
+
+    Raises
+    ------
+    ParameterError
+        For keys below something that is no section.
+    """
+    found: dict[str, Any] = {}
+    for key, value in mapping.items():
+        first, dot, rest = str(key).partition(".")
+        inner = nested({rest: value}) if dot else nested(value) if isinstance(value, Mapping) else value
+        below = found.get(first)
+        found[first] = merged(below, inner) if isinstance(below, dict) and isinstance(inner, dict) else inner
+    return found
+
+
+def merged(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
+    """Sections of two mappings; where both have a value, that of the second."""
+    both = dict(below)
+    for key, value in above.items():
+        inner = both.get(key)
+        both[key] = merged(inner, value) if isinstance(inner, Mapping) and isinstance(value, Mapping) else value
+    return both
+
+
+# --- what is declared
+
+
+@dataclasses.dataclass(frozen=True)
+class Declared:
+    """One parameter of a set.
+
+    Attributes
+    ----------
+    key : str
+        Dotted key in a file.
+    parameter : Parameter
+    kind : type
+        Of its value, without its declaration.
+    value
+        Value, or default when a class was asked for, in the file's unit; ``dataclasses.MISSING`` where there is none.
+    """
+
+    key: str
+    parameter: Parameter
+    kind: Any
+    value: Any
+
+
+def declared(params: Any, prefix: str = "") -> Iterator[Declared]:
+    """Every parameter of a set (with its value) or of a class of them (with its default), those of sections included.
+
+    Fields without a :class:`Parameter` that are no sections, and sections that are None, are left out.
+    """
+    for item in dataclasses.fields(params):
+        hint = _hints(params if isinstance(params, type) else type(params))[item.name]
+        key = f"{prefix}{file_key(item.name)}"
+        value = _default(item) if isinstance(params, type) else getattr(params, item.name)
+        parameter = _parameter_of(hint)
+        if parameter is not None:
+            shown = value if value is dataclasses.MISSING else parameter.in_file_units(value)
+            yield Declared(key=key, parameter=parameter, kind=hint.__origin__, value=shown)
+        elif value is dataclasses.MISSING and dataclasses.is_dataclass(hint):
+            yield from declared(hint, f"{key}.")
+        elif dataclasses.is_dataclass(value):
+            yield from declared(value, f"{key}.")
+
+
+def json_schema(kind: type[Any]) -> dict[str, Any]:
+    """JSON Schema of a set in a file, defaults in the file's units."""
+    return _adapter(kind).json_schema(by_alias=True, schema_generator=_InFileUnits)
+
+
+def unknown_parameters(names: Iterable[str], known: Iterable[str]) -> None:
+    """Raise ParameterError for the first name that is not known."""
+    known = list(known)
+    for name in names:
+        if name not in known:
+            raise ParameterError(f"parameter '{name}' is unknown{_nearest(name, known)}")
+
+
+# --- inside
+
+
+class _InFileUnits(GenerateJsonSchema):
+    """JSON Schemas whose defaults stand as a file has them; a section's are those of its keys."""
+
+    def dataclass_schema(self, schema: core_schema.DataclassSchema) -> dict[str, Any]:
+        found: dict[str, Any] = super().dataclass_schema(schema)
+        for each in dataclasses.fields(schema["cls"]):
+            parameter, place = _parameter_of(_hints(schema["cls"])[each.name]), file_key(each.name)
+            entry = found.get("properties", {}).get(place, {})
+            entry.pop("title", None)
+            if parameter is None:
+                entry.pop("default", None)
+            elif "default" in entry:
+                entry["default"] = pydantic_core.to_jsonable_python(parameter.in_file_units(_default(each)))
+        return found
+
+
+_adapter: Callable[[Any], TypeAdapter[Any]] = functools.cache(TypeAdapter)
+_hints: Callable[[Any], dict[str, Any]] = functools.cache(partial(typing.get_type_hints, include_extras=True))
+
+
+def _parameter_of(hint: Any) -> Parameter | None:
+    found = [each for each in getattr(hint, "__metadata__", ()) if isinstance(each, Parameter)]
+    return found[0] if found else None
+
+
+def _default(item: dataclasses.Field[Any]) -> Any:
+    return item.default_factory() if item.default_factory is not dataclasses.MISSING else item.default
+
+
+def _numbers(value: Any) -> Iterator[float]:
+    if isinstance(value, tuple):
+        for each in value:
+            yield from _numbers(each)
+    elif isinstance(value, (int, float)) and not isinstance(value, bool):
+        yield value
+
+
+_SCALARS: Final = ("float", "int", "bool", "str")
+
+
+def _strict(schema: Any) -> Any:
+    """The same with no conversion between numbers, texts and flags, in lists too."""
+    if isinstance(schema, dict):
+        inner = {key: _strict(value) for key, value in schema.items() if key != "metadata"}
+        strict = {"strict": True} if schema.get("type") in _SCALARS else {}
+        return {**schema, **inner, **strict}
+    return [_strict(each) for each in schema] if isinstance(schema, list) else schema
+
+
+def _bounded(schema: dict[str, Any], low: float | None, high: float | None) -> dict[str, Any]:
+    """A JSON Schema with the bounds at its numbers."""
+    found = dict(schema)
+    if found.get("type") in ("number", "integer"):
+        found |= {} if low is None else {"minimum": low}
+        found |= {} if high is None else {"maximum": high}
+    for key in ("items", "anyOf", "prefixItems"):
+        inner = found.get(key)
+        if isinstance(inner, dict):
+            found[key] = _bounded(inner, low, high)
+        elif isinstance(inner, list):
+            found[key] = [_bounded(each, low, high) for each in inner]
+    return found
+
+
+# --- errors
+
+
+def _explained(kind: type[Any], error: ValidationError, section: str = "") -> ParameterError:
+    """The first thing that is wrong, in the words of a file."""
+    found = error.errors(include_url=False)[0]
+    path = tuple(str(each) for each in found["loc"] if isinstance(each, str))
+    key = ".".join((*([section] if section else []), *(file_key(each) for each in path)))
+    reason, value = found["type"], found["input"]
+    if reason in ("too_long", "too_short") or (reason in _MISSING and isinstance(found["loc"][-1], int)):
+        return ParameterError(f"{key} = {value!r} has not the right number of values")
+    if reason in _UNKNOWN:
+        known = [file_key(each.name) for each in dataclasses.fields(_section_at(kind, path[:-1]))]
+        return ParameterError(f"{'.'.join((*key.split('.')[:-1], path[-1]))} is unknown{_nearest(path[-1], known)}")
+    if reason in _MISSING:
+        parameter = _parameter_of(_hints(_section_at(kind, path[:-1])).get(_field_of(path[-1])))
+        return ParameterError(f"{key} is missing" + (f" ({parameter.doc})" if parameter else ""))
+    if reason == _OUT_OF_BOUNDS:
+        return ParameterError(f"{key} = {found['msg']}")
+    if reason in ("value_error", "assertion_error"):
+        own = str(found["ctx"]["error"])
+        return ParameterError(f"{key}: {own}" if key else own)
+    if reason == "literal_error":
+        return ParameterError(f"{key} = {value!r} is not one of {found['ctx']['expected'].replace(' or ', ', ')}")
+    return ParameterError(f"{key} = {value!r} {_KINDS.get(reason, found['msg'])}")
+
+
+def _nearest(name: str, known: list[str]) -> str:
+    near = difflib.get_close_matches(name, known, n=1)
+    return f"; did you mean '{near[0]}'?" if near else f"; known are {', '.join(sorted(known))}"
+
+
+def _field_of(key: str) -> str:
+    """Field name of a key."""
+    for own, in_files in _ANGLES:
+        if key.endswith(in_files):
+            return key.removesuffix(in_files) + own
+    return key
+
+
+def _section_at(kind: Any, path: tuple[str, ...]) -> Any:
+    """Class of the section that a path of keys leads to; the last one that is known."""
+    for key in path:
+        hint = _hints(kind).get(_field_of(key))
+        inner = next((each for each in _classes(hint) if dataclasses.is_dataclass(each)), None)
+        if inner is None:
+            return kind
+        kind = inner
+    return kind
+
+
+def _classes(hint: Any) -> Iterator[Any]:
+    if isinstance(hint, type):
+        yield hint
+    for each in typing.get_args(hint):
+        yield from _classes(each)
+
+
+# --- until every set of parameters is declared as above
+
+_OLD_KINDS: Final = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
 
 
 def require(name: str, value: object, condition: bool, expected: str) -> None:
@@ -47,22 +447,12 @@ def field_types(params_type: type[Any]) -> dict[str, Any]:
     return {item.name: hints[item.name] for item in dataclasses.fields(params_type)}
 
 
-def unknown_parameters(names: Iterable[str], known: Iterable[str]) -> None:
-    """Raise ParameterError for the first name that is not known."""
-    known = list(known)
-    for name in names:
-        if name not in known:
-            near = difflib.get_close_matches(name, known, n=1)
-            hint = f"; did you mean '{near[0]}'?" if near else f"; known are {', '.join(sorted(known))}"
-            raise ParameterError(f"parameter '{name}' is unknown{hint}")
-
-
 def _coerced(name: str, value: Any, kind: Any) -> Any:
     if kind is float and type(value) is int:
         return float(value)
     if typing.get_origin(kind) is tuple:
         return _coerced_tuple(name, value, typing.get_args(kind)[0])
-    require(name, value, type(value) is kind, _KINDS[kind])
+    require(name, value, type(value) is kind, _OLD_KINDS[kind])
     return value
 
 
