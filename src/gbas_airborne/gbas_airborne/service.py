@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from enum import IntEnum
 from typing import Final, NamedTuple
 
 from gbas_airborne.navigation.guidance import alert_limits_m
@@ -21,29 +20,12 @@ from gbas_airborne.params import NO_FAS, AirborneParams
 from gbas_airborne.protection.levels import NOT_PROTECTED, Multipliers, ProtectionLevels, protection_levels
 from gbas_airborne.reception.vdb_messages import HEALTHY_GCID
 from gbas_core.positioning.approach import APD_C, APD_CD
-from gbas_msgs_py.events import Event, EventKind
-from gbas_msgs_py.records import ProtectionEpoch, ServiceType, SolutionEpoch
+from gbas_msgs_py.codes import ApproachState, EventKind, ServiceType
+from gbas_msgs_py.events import Event
+from gbas_msgs_py.records import ProtectionEpoch, SolutionEpoch
 
 SERVICE_C_APD: Final = (float(APD_C), float(APD_CD))
 SOURCE: Final = "protection_level"
-
-
-class ApproachState(IntEnum):
-    """Where the receiver is between silence and guidance."""
-
-    NO_SIGNAL = 0
-    """No valid message of the station."""
-    VDB_ACQUIRED = 1
-    """Messages arrive, but not yet all that are needed (types 1 and 2, and 4 for an approach), or the station is not
-    healthy."""
-    DATA_VALID = 2
-    """All messages are there; no protected position yet."""
-    DIFFERENTIAL = 3
-    """Protected position; not, or not yet, on an approach: none selected, outside its volume, or limits exceeded."""
-    APPROACH = 4
-    """Within the service volume of the selected approach, protection levels within the alert limits."""
-    LOSS = 5
-    """Service was given and is lost."""
 
 
 class Failure(NamedTuple):
