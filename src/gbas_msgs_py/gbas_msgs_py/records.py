@@ -6,8 +6,10 @@ Satellite states and service types are small integers carried as floats (a table
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from gbas_core.record import FloatArray, Record, per_satellite, scalar
+from gbas_msgs_py.products import PRODUCTS
 
 MAX_REFERENCE_RECEIVERS = 4
 _RECEIVERS = range(1, MAX_REFERENCE_RECEIVERS + 1)
@@ -35,11 +37,24 @@ GROUND_MONITORS = (
 """Monitors of the ground station, in the order in which tables have them."""
 
 
+def by_product(columns: str, unit: str, doc: str) -> Any:
+    """Declare a field ``(product, satellite)``; `columns` is the pattern of the columns' names."""
+    names = tuple(columns.format(product=product.name) for product in PRODUCTS)
+    return per_satellite(unit, doc, columns=names)
+
+
+def by_receiver(columns: str, unit: str, doc: str) -> Any:
+    """Declare a field ``(product, reference receiver, satellite)``; `columns` is the pattern of the columns' names."""
+    names = tuple(columns.format(product=product.name, receiver=j) for product in PRODUCTS for j in _RECEIVERS)
+    return per_satellite(unit, doc, columns=names, leading=(len(PRODUCTS), MAX_REFERENCE_RECEIVERS))
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class IntegrityEpoch(Record):
     """Ground corrections of one epoch after monitoring: what may be broadcast, and why the rest may not.
 
-    Corrections are NaN unless `state` is USABLE.
+    Corrections are NaN unless `state` is USABLE. Fields of corrections have the products of
+    :data:`~gbas_msgs_py.products.PRODUCTS` as their first axis; those that a station does not make are NaN.
     """
 
     n_receivers: float = scalar("-", "reference receivers in use")
@@ -47,22 +62,18 @@ class IntegrityEpoch(Record):
     state: FloatArray = per_satellite("-", "ChannelState")
     cause: FloatArray = per_satellite("-", "ExclusionCause, 0 when none")
     elevation_rad: FloatArray = per_satellite("rad", "elevation at the reference point")
-    p_ephemeris: FloatArray = per_satellite("m/m", "ephemeris decorrelation parameter of the 100 s correction")
-    p_ephemeris_d: FloatArray = per_satellite("m/m", "the same of the 30 s correction")
+    p_ephemeris: FloatArray = by_product("p_ephemeris_{product}", "m/m", "ephemeris decorrelation parameter")
     iod: FloatArray = per_satellite("-", "issue of data of the ephemeris used")
     ephemeris_crc: FloatArray = per_satellite("-", "16-bit ephemeris CRC")
-    prc_100_m: FloatArray = per_satellite("m", "pseudorange correction, 100 s smoothing")
-    rrc_100_mps: FloatArray = per_satellite("m/s", "range rate correction, 100 s smoothing")
-    prc_30_m: FloatArray = per_satellite("m", "pseudorange correction, 30 s smoothing")
-    rrc_30_mps: FloatArray = per_satellite("m/s", "range rate correction, 30 s smoothing")
-    sigma_pr_gnd_m: FloatArray = per_satellite("m", "broadcast sigma of the 100 s correction")
-    sigma_pr_gnd_d_m: FloatArray = per_satellite("m", "sigma of the 100 s correction without ionospheric inflation")
-    sigma_pr_gnd_30_m: FloatArray = per_satellite("m", "sigma of the 30 s correction")
-    b_m: FloatArray = per_satellite(
-        "m", "B value of a reference receiver, NaN where it was not used", columns=tuple(f"b{j}_m" for j in _RECEIVERS)
+    prc_m: FloatArray = by_product("prc_{product}_m", "m", "pseudorange correction")
+    rrc_mps: FloatArray = by_product("rrc_{product}_mps", "m/s", "range rate correction")
+    sigma_pr_gnd_m: FloatArray = by_product("sigma_pr_gnd_{product}_m", "m", "broadcast sigma of the correction")
+    sigma_pr_gnd_d_m: FloatArray = per_satellite("m", "sigma of the L1 100 s correction without ionospheric inflation")
+    b_m: FloatArray = by_receiver(
+        "b{receiver}_{product}_m", "m", "B value of a reference receiver, NaN where it was not used"
     )
-    receiver_used: FloatArray = per_satellite(
-        "-", "1 where the receiver's channel was used", columns=tuple(f"rr{j}_used" for j in _RECEIVERS)
+    receiver_used: FloatArray = by_receiver(
+        "rr{receiver}_{product}_used", "-", "1 where the receiver's channel was used"
     )
 
 

@@ -126,7 +126,7 @@ class TableSchema(Generic[R]):
             values = getattr(record, name)
             if values.shape != shape:
                 raise SchemaError(f"{self.identifier}: {name} has shape {values.shape}, expected {shape}")
-            block[rows] = values
+            block[rows] = values.reshape(-1, N_SATS)
         present = np.flatnonzero(~np.isnan(block).all(axis=0))
         table = np.empty((max(present.size, 1), len(self.columns)))
         table[:, : self._n_head] = head
@@ -224,9 +224,8 @@ def _array_layout(
     columns: list[str] = []
     for item, spec in specs:
         if spec.satellite:
-            # A field declared without `columns` is named after itself and has no leading axis.
-            shape = (N_SATS,) if spec.names == (item.name,) else (len(spec.names), N_SATS)
-            layout.append((item.name, slice(len(columns), len(columns) + len(spec.names)), shape))
+            rows = slice(len(columns), len(columns) + len(spec.names))
+            layout.append((item.name, rows, (*spec.leading, N_SATS)))
             columns.extend(spec.names)
     return tuple(layout), columns
 

@@ -35,7 +35,7 @@ class TruthEpoch(Record):
 
 OBSERVATIONS: Final = TableSchema("observations", 1, ObservationEpoch)
 EPHEMERIS: Final = TableSchema("ephemeris", 1, Ephemeris)
-INTEGRITY: Final = TableSchema("integrity", 2, IntegrityEpoch)
+INTEGRITY: Final = TableSchema("integrity", 3, IntegrityEpoch)
 MONITORS: Final = TableSchema("monitors", 1, MonitorEpoch)
 CHANNELS: Final = TableSchema("channels", 1, ChannelEpoch)
 SOLUTION: Final = TableSchema("solution", 1, SolutionEpoch)

@@ -91,7 +91,7 @@ TOPICS: Final[tuple[TopicSpec, ...]] = (
     TopicSpec(name=AIRBORNE_OBSERVATIONS, message_type=_TABLE, schema="gbas/observations/1"),
     TopicSpec(name=EPHEMERIS, message_type=_TABLE, schema="gbas/ephemeris/1", latched=True),
     TopicSpec(name=AIRBORNE_EPHEMERIS, message_type=_TABLE, schema="gbas/ephemeris/1", latched=True),
-    TopicSpec(name=GROUND_INTEGRITY, message_type=_TABLE, schema="gbas/integrity/2"),
+    TopicSpec(name=GROUND_INTEGRITY, message_type=_TABLE, schema="gbas/integrity/3"),
     TopicSpec(name=GROUND_MONITORS, message_type=_TABLE, schema="gbas/monitors/1"),
     TopicSpec(name=GROUND_CHANNELS, message_type=_TABLE, schema="gbas/channels/1"),
     TopicSpec(name=VDB, message_type="std_msgs/msg/UInt8MultiArray", schema="gbas/vdb_burst/1"),

@@ -20,6 +20,7 @@ from gbas_ground.station import GroundEpoch, GroundStation, Monitored, StationSt
 from gbas_msgs_py.codes import EventKind, MonitorState
 from gbas_msgs_py.events import Event
 from gbas_msgs_py.joining import ReceptionQueue
+from gbas_msgs_py.products import L1_100
 from gbas_msgs_py.records import GROUND_MONITORS
 from gbas_sim.atmosphere.fronts import PlasmaBubble, WedgeFront
 from gbas_sim.faults.kinds import ReceiverFault, SatelliteFault
@@ -183,7 +184,7 @@ def _steps(
 
 
 def _usable(monitored: Monitored) -> Iterator[str]:
-    used = np.isfinite(monitored.integrity.prc_100_m)
+    used = np.isfinite(monitored.integrity.prc_m[L1_100])
     return (name for name, index in SAT_INDEX.items() if used[index])
 
 
