@@ -776,9 +776,9 @@ def _sent(integrity: IntegrityEpoch, chain: Any) -> dict[int, tuple[Correction10
 
 # What a protection level, a limit or the service is made of; the others are for people.
 MATTERS = (
-    "x_m", "y_m", "z_m", "n_receivers", "correction_age_s", "message_age_s", "gcid", "k_md_e", "fasval_m", "faslal_m",
-    "apd", "d_vert_m", "d_lat_m", "s_vert", "s_lat", "sigma_gnd_m", "sigma_air_m", "sigma_tropo_m", "sigma_iono_m",
-    "b_m", "ephemeris_error_m",
+    "mode", "x_m", "y_m", "z_m", "n_receivers", "correction_age_s", "message_age_s", "gcid", "k_md_e", "fasval_m",
+    "faslal_m", "apd", "d_vert_m", "d_lat_m", "s_vert", "s_lat", "sigma_gnd_m", "sigma_air_m", "sigma_tropo_m",
+    "sigma_iono_m", "b_m", "ephemeris_error_m",
 )  # fmt: skip
 
 

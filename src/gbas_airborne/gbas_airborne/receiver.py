@@ -30,6 +30,7 @@ from gbas_core.satellites import SAT_IDS, missing
 from gbas_core.signals import L1
 from gbas_msgs_py.codes import EventKind, Rejection
 from gbas_msgs_py.events import Event
+from gbas_msgs_py.modes import L1_100
 from gbas_msgs_py.records import ProtectionEpoch, SolutionEpoch
 from gbas_vdb.messages.ephemeris_crc import ephemeris_crcs
 from gbas_vdb.transmission.burst import Burst
@@ -417,6 +418,7 @@ def _solution(epoch: AirborneEpoch, reception: ReceptionState, fix: Fix | None) 
     station, corrections = reception.station, reception.corrections
     z_time = (corrections.gps_week, corrections.tow_s) if corrections is not None else None
     told: dict[str, Any] = {
+        "mode": float(L1_100.number),
         "correction_age_s": _age_s(z_time, week, tow_s),
         "message_age_s": _age_s(reception.type1_received, week, tow_s),
         "gcid": float(station.gcid) if station is not None else math.nan,

@@ -22,10 +22,12 @@ from gbas_airborne.reception.vdb_messages import HEALTHY_GCID
 from gbas_core.positioning.approach import APD_C, APD_CD
 from gbas_msgs_py.codes import ApproachState, EventKind, ServiceType
 from gbas_msgs_py.events import Event
+from gbas_msgs_py.modes import MODES
 from gbas_msgs_py.records import ProtectionEpoch, SolutionEpoch
 
 SERVICE_C_APD: Final = (float(APD_C), float(APD_CD))
 SOURCE: Final = "protection_level"
+_SERVICE_C_MODES: Final = tuple(float(mode.number) for mode in MODES if mode.service is ServiceType.C)
 
 
 class Failure(NamedTuple):
@@ -82,6 +84,7 @@ def service_step(
     protection = ProtectionEpoch(
         gps_week=solution.gps_week,
         tow_s=solution.tow_s,
+        mode=solution.mode,
         service=float(new.service),
         alert=float(failure is not None),
         vpl_m=float(levels.level_m[0]),
@@ -134,6 +137,8 @@ def _position_failure(solution: SolutionEpoch, params: AirborneParams) -> Failur
         return Failure(valid, "correction_age", solution.correction_age_s, params.correction_timeout_s)
     if not math.isfinite(solution.x_m + solution.y_m + solution.z_m):
         return Failure(valid, "no_position", solution.n_sats, math.nan)
+    if solution.mode not in _SERVICE_C_MODES:
+        return Failure(valid, "mode_without_service", solution.mode, math.nan)
     if params.require_ephemeris_bound and not solution.k_md_e > 0.0:
         return Failure(valid, "no_ephemeris_bound", solution.k_md_e, math.nan)
     return None

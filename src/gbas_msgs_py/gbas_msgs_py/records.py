@@ -5,36 +5,22 @@ Satellite states and service types are small integers carried as floats (a table
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
-from gbas_core.record import FloatArray, Record, per_satellite, scalar
+import numpy as np
+
+from gbas_core.record import FloatArray, Record, columns_of, per_row, per_satellite, scalar
+from gbas_core.satellites import N_SATS, RANGING_SOURCE_ID, SAT_IDS, SAT_INDEX, SOURCE_ID_INDEX
+from gbas_msgs_py.codes import MonitorState, Signal
+from gbas_msgs_py.monitors import MONITORS, TESTS, monitor_named
 from gbas_msgs_py.products import PRODUCTS
 
 MAX_REFERENCE_RECEIVERS = 4
 _RECEIVERS = range(1, MAX_REFERENCE_RECEIVERS + 1)
 BASELINES = tuple((i, j) for i in _RECEIVERS for j in _RECEIVERS if i < j)
 """Pairs of reference receivers, in the order in which tables have them."""
-GROUND_MONITORS = (
-    "range",
-    "power",
-    "expected_power",
-    "ccd",
-    "ccd_f",
-    "ccd_f_paper",
-    "gradient",
-    "acceleration",
-    "carrier_rate",
-    "carrier_step",
-    "common_slip",
-    "ephemeris",
-    "b_value",
-    "prc",
-    "rrc",
-    "sigma_mean",
-    "sigma_spread",
-)
-"""Monitors of the ground station, in the order in which tables have them."""
 
 
 def by_product(columns: str, unit: str, doc: str) -> Any:
@@ -94,21 +80,96 @@ class ChannelEpoch(Record):
     )
 
 
+class MonitorRow(NamedTuple):
+    """One row of the monitors table in words."""
+
+    monitor: str
+    test: str
+    sat: str
+    signal: Signal
+    statistic: float
+    threshold: float
+    state: MonitorState
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MonitorEpoch(Record):
-    """What every ground monitor measured at one epoch: statistic, threshold and state by satellite, and what is behind.
+    """What the ground monitors said at one epoch: a row for each test, satellite and signal that was due.
 
-    Where a monitor tests several values of a satellite (receivers, baselines, smoothing constants), its statistic is
-    the one that is worst against its threshold. Statistics and thresholds have the unit of the monitor's documentation.
+    Where a test has several values of a satellite (receivers, baselines, smoothing constants, bands), its row is the
+    one that is worst against its threshold.
     """
 
-    statistic: FloatArray = per_satellite(
-        "*", "statistic", columns=tuple(f"{name}_statistic" for name in GROUND_MONITORS)
+    monitor: FloatArray = per_row(
+        "-", "number of the monitor", key=True, codes=(monitor.number for monitor in MONITORS)
     )
-    threshold: FloatArray = per_satellite(
-        "*", "threshold of the statistic", columns=tuple(f"{name}_threshold" for name in GROUND_MONITORS)
+    test: FloatArray = per_row("-", "number of its test", key=True, codes=(number for _, number in TESTS))
+    sat: FloatArray = per_row("-", "ranging source identifier", key=True, codes=RANGING_SOURCE_ID.tolist())
+    signal: FloatArray = per_row("-", "Signal; 0 when it is of no single one", key=True, codes=Signal)
+    statistic: FloatArray = per_row("*", "statistic, in the unit of the test; NaN when there was none")
+    threshold: FloatArray = per_row("*", "threshold of the statistic")
+    state: FloatArray = per_row(
+        "-", "MonitorState", codes=(state for state in MonitorState if state is not MonitorState.NOT_DUE)
     )
-    state: FloatArray = per_satellite("-", "MonitorState", columns=tuple(f"{name}_state" for name in GROUND_MONITORS))
+
+    def check(self) -> None:
+        """Refuse a test that its monitor does not have."""
+        for monitor, test in set(zip(self.monitor.tolist(), self.test.tolist(), strict=True)):
+            if (monitor, test) not in TESTS:
+                raise ValueError(f"monitor {monitor:g} has no test {test:g}")
+
+    def __len__(self) -> int:
+        return len(self.monitor)
+
+    def select(self, *, monitor: str = "", test: str = "", sat: str = "") -> MonitorEpoch:
+        """The rows of a monitor, of one of its tests, of a satellite (``"G05"``), or of all that are given.
+
+        Raises
+        ------
+        KeyError
+            When there is no such monitor, test or satellite.
+        """
+        rows = np.ones(len(self), dtype=bool)
+        if monitor:
+            entry = monitor_named(monitor)
+            rows &= self.monitor == entry.number
+            if test:
+                rows &= self.test == entry.test(test).number
+        elif test:
+            raise KeyError(f"test {test!r} of which monitor?")
+        if sat:
+            rows &= self.sat == RANGING_SOURCE_ID[SAT_INDEX[sat]]
+        return replace(self, **{item.name: getattr(self, item.name)[rows] for item, _ in columns_of(MonitorEpoch)})
+
+    def states(self, monitor: str, test: str = "") -> FloatArray:
+        """MonitorState by satellite, ``(N,)``: NOT_DUE without a row, the largest number of several rows."""
+        chosen, states = self.select(monitor=monitor, test=test), np.full(N_SATS, float(MonitorState.NOT_DUE))
+        index = [SOURCE_ID_INDEX[int(sat)] for sat in chosen.sat.tolist()]
+        np.maximum.at(states, index, chosen.state)
+        return states
+
+    def rows(self) -> Iterator[MonitorRow]:
+        """The rows in words."""
+        columns = (self.monitor, self.test, self.sat, self.signal, self.statistic, self.threshold, self.state)
+        for number, test_number, sat, signal, statistic, threshold, state in zip(
+            *(column.tolist() for column in columns), strict=True
+        ):
+            monitor, test = TESTS[number, test_number]
+            yield MonitorRow(
+                monitor.name,
+                test.name,
+                SAT_IDS[int(SOURCE_ID_INDEX[int(sat)])],
+                Signal(int(signal)),
+                statistic,
+                threshold,
+                MonitorState(int(state)),
+            )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MonitorDetailEpoch(Record):
+    """What is behind the ground monitors' statistics: the vectors by receiver, combination and baseline."""
+
     ccd_receiver_mps: FloatArray = per_satellite(
         "m/s", "divergence rate of one receiver, L1", columns=tuple(f"rr{j}_ccd_mps" for j in _RECEIVERS)
     )
@@ -137,6 +198,7 @@ class SolutionEpoch(Record):
     the final course; without a FAS it is to the left of north (west).
     """
 
+    mode: float = scalar("-", "number of the processing mode, of MODES")
     x_m: float = scalar("m", "ECEF position")
     y_m: float = scalar("m", "ECEF position")
     z_m: float = scalar("m", "ECEF position")
@@ -177,6 +239,7 @@ class SolutionEpoch(Record):
 class ProtectionEpoch(Record):
     """Protection levels, alert limits and the service of one airborne epoch."""
 
+    mode: float = scalar("-", "number of the processing mode of the solution, of MODES")
     service: float = scalar("-", "ServiceType in use")
     alert: float = scalar("-", "1 when navigation must not be trusted, 0 when it may")
     vpl_m: float = scalar("m", "vertical protection level")

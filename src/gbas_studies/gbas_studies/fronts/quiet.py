@@ -144,7 +144,7 @@ def fly(
         if isinstance(output, GroundOutput):
             row = places[epoch_key(output.integrity.gps_week, output.integrity.tow_s)]
             used[row] = np.nan_to_num(output.integrity.receiver_used[L1_100, :receivers])
-            divergence[row] = output.monitored.statistics.ccd_receiver_mps[:receivers]
+            divergence[row] = output.monitored.details.ccd_receiver_mps[:receivers]
             rows["sigma_vig"][row] = output.integrity.sigma_vert_iono_gradient
         elif isinstance(output, AirborneOutput):
             solution, protection = output.solution, output.protection
