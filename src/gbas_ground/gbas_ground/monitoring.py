@@ -565,7 +565,11 @@ def _power(
     if exclude and found.channels.failed.any():
         channels = (Verdict(ExclusionCause.EXPECTED_POWER, worst_of(_moved(found.channels, 1, 0), axes=1)),)
     return state, _MonitorOutput(
-        summaries={EXPECTED_POWER.key("satellite"): summarise(satellites, np.logical_or.reduce(due))},
+        summaries={
+            EXPECTED_POWER.key("satellite"): summarise(
+                satellites, np.logical_or.reduce(due), signal_of(settings.power.bands)
+            )
+        },
         satellites=_verdicts(exclude, (ExclusionCause.EXPECTED_POWER, satellites), inputs.due),
         channels=channels,
     )
