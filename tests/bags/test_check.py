@@ -14,7 +14,8 @@ import pytest
 from gbas_bags.check import CheckResult, check
 from gbas_core.gnss.gpstime import from_epoch_key
 from gbas_msgs_py import topics
-from gbas_msgs_py.events import Event, EventKind
+from gbas_msgs_py.codes import EventKind
+from gbas_msgs_py.events import Event
 
 RR1 = topics.resolve(topics.GROUND_OBSERVATIONS[0])
 AIRBORNE = topics.resolve(topics.AIRBORNE_OBSERVATIONS)
@@ -80,11 +81,28 @@ def test_cut_payload_is_named(checked: Any) -> None:
 def test_unknown_schema_version_is_named(checked: Any) -> None:
     def change(fake: Any) -> None:
         key, data = fake.content[SOLUTION][5]
-        fake.content[SOLUTION][5] = (key, data.replace(b"gbas/solution/1", b"gbas/solution/9"))
+        fake.content[SOLUTION][5] = (key, data.replace(b"gbas/solution/2", b"gbas/solution/9"))
 
     result = checked(change)
     assert (SOLUTION, 5) in [(problem.topic, problem.index) for problem in result.problems]
     assert any("version '9'" in problem.what for problem in result.problems)
+
+
+def test_tables_of_an_older_version_are_told_once_and_what_can_be_done(checked: Any) -> None:
+    def change(fake: Any) -> None:
+        for topic, name in ((SOLUTION, b"solution"), (PROTECTION, b"protection")):
+            new, old = b"gbas/" + name + b"/2", b"gbas/" + name + b"/1"
+            fake.content[topic] = [(key, data.replace(new, old)) for key, data in fake.content[topic]]
+
+    result = checked(change)
+    assert [(problem.topic, problem.what) for problem in result.problems] == [
+        (SOLUTION, "40 tables are gbas/solution/1, and gbas/solution/2 is read: not checked"),
+        (PROTECTION, "40 tables are gbas/protection/1, and gbas/protection/2 is read: not checked"),
+    ]
+    assert result.notes == [
+        "written with older versions of protection/1 (read: 2), solution/1 (read: 2); its observations and ephemerides "
+        "are read: gbas replay makes the rest anew"
+    ]
 
 
 def test_schema_of_another_topic_is_named(checked: Any) -> None:
@@ -92,7 +110,7 @@ def test_schema_of_another_topic_is_named(checked: Any) -> None:
         fake.content[SOLUTION][5] = fake.content[PROTECTION][5]
 
     result = checked(change)
-    assert any(problem.index == 5 and "expected 'gbas/solution/1'" in problem.what for problem in result.problems)
+    assert any(problem.index == 5 and "expected 'gbas/solution/2'" in problem.what for problem in result.problems)
 
 
 def test_wrong_crc_of_a_message_block_is_named(checked: Any, tmp_path: Path) -> None:

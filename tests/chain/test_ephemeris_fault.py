@@ -20,8 +20,7 @@ from gbas_chain.results import Row
 from gbas_core.gnss.gpstime import epoch_key
 from gbas_core.satellites import SAT_INDEX
 from gbas_ground.params import watching
-from gbas_msgs_py.codes import ExclusionCause
-from gbas_msgs_py.records import ChannelState
+from gbas_msgs_py.codes import ChannelState, ExclusionCause
 
 FOLDER = "static_pair_L1L2_1h_2010"
 RIGHT, WRONG = "brdc0770.10n.gz", "brdc0770.10nERR.gz"

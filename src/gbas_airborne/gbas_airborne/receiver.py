@@ -17,13 +17,7 @@ from numpy.typing import NDArray
 from gbas_airborne.navigation.guidance import approach_columns, guidance_columns
 from gbas_airborne.navigation.position import Fix, PositionInputs, PositionResult, Speed, tested_position
 from gbas_airborne.params import AirborneParams
-from gbas_airborne.ranging.corrected_ranges import (
-    RangingSources,
-    Rejection,
-    SmoothedRanges,
-    millisecond_step_m,
-    ranging_sources,
-)
+from gbas_airborne.ranging.corrected_ranges import RangingSources, SmoothedRanges, millisecond_step_m, ranging_sources
 from gbas_airborne.reception.vdb_messages import SOURCE, ReceptionState, reception_step
 from gbas_airborne.service import ServiceState, service_step
 from gbas_core.gnss.ephemeris import Ephemeris, EphemerisStore
@@ -34,7 +28,9 @@ from gbas_core.ranging.smoothing import SmoothingParams, SmoothingState, initial
 from gbas_core.record import FloatArray
 from gbas_core.satellites import SAT_IDS, missing
 from gbas_core.signals import L1
-from gbas_msgs_py.events import Event, EventKind
+from gbas_msgs_py.codes import EventKind, Rejection
+from gbas_msgs_py.events import Event
+from gbas_msgs_py.modes import L1_100
 from gbas_msgs_py.records import ProtectionEpoch, SolutionEpoch
 from gbas_vdb.messages.ephemeris_crc import ephemeris_crcs
 from gbas_vdb.transmission.burst import Burst
@@ -422,6 +418,7 @@ def _solution(epoch: AirborneEpoch, reception: ReceptionState, fix: Fix | None) 
     station, corrections = reception.station, reception.corrections
     z_time = (corrections.gps_week, corrections.tow_s) if corrections is not None else None
     told: dict[str, Any] = {
+        "mode": float(L1_100.number),
         "correction_age_s": _age_s(z_time, week, tow_s),
         "message_age_s": _age_s(reception.type1_received, week, tow_s),
         "gcid": float(station.gcid) if station is not None else math.nan,

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from enum import IntEnum
 from typing import Final, NamedTuple
 
 from gbas_airborne.navigation.guidance import alert_limits_m
@@ -21,29 +20,14 @@ from gbas_airborne.params import NO_FAS, AirborneParams
 from gbas_airborne.protection.levels import NOT_PROTECTED, Multipliers, ProtectionLevels, protection_levels
 from gbas_airborne.reception.vdb_messages import HEALTHY_GCID
 from gbas_core.positioning.approach import APD_C, APD_CD
-from gbas_msgs_py.events import Event, EventKind
-from gbas_msgs_py.records import ProtectionEpoch, ServiceType, SolutionEpoch
+from gbas_msgs_py.codes import ApproachState, EventKind, ServiceType
+from gbas_msgs_py.events import Event
+from gbas_msgs_py.modes import MODES
+from gbas_msgs_py.records import ProtectionEpoch, SolutionEpoch
 
 SERVICE_C_APD: Final = (float(APD_C), float(APD_CD))
 SOURCE: Final = "protection_level"
-
-
-class ApproachState(IntEnum):
-    """Where the receiver is between silence and guidance."""
-
-    NO_SIGNAL = 0
-    """No valid message of the station."""
-    VDB_ACQUIRED = 1
-    """Messages arrive, but not yet all that are needed (types 1 and 2, and 4 for an approach), or the station is not
-    healthy."""
-    DATA_VALID = 2
-    """All messages are there; no protected position yet."""
-    DIFFERENTIAL = 3
-    """Protected position; not, or not yet, on an approach: none selected, outside its volume, or limits exceeded."""
-    APPROACH = 4
-    """Within the service volume of the selected approach, protection levels within the alert limits."""
-    LOSS = 5
-    """Service was given and is lost."""
+_SERVICE_C_MODES: Final = tuple(float(mode.number) for mode in MODES if mode.service is ServiceType.C)
 
 
 class Failure(NamedTuple):
@@ -100,6 +84,7 @@ def service_step(
     protection = ProtectionEpoch(
         gps_week=solution.gps_week,
         tow_s=solution.tow_s,
+        mode=solution.mode,
         service=float(new.service),
         alert=float(failure is not None),
         vpl_m=float(levels.level_m[0]),
@@ -152,6 +137,8 @@ def _position_failure(solution: SolutionEpoch, params: AirborneParams) -> Failur
         return Failure(valid, "correction_age", solution.correction_age_s, params.correction_timeout_s)
     if not math.isfinite(solution.x_m + solution.y_m + solution.z_m):
         return Failure(valid, "no_position", solution.n_sats, math.nan)
+    if solution.mode not in _SERVICE_C_MODES:
+        return Failure(valid, "mode_without_service", solution.mode, math.nan)
     if params.require_ephemeris_bound and not solution.k_md_e > 0.0:
         return Failure(valid, "no_ephemeris_bound", solution.k_md_e, math.nan)
     return None

@@ -26,19 +26,19 @@ from gbas_ground.approaches import fas_data_set
 from gbas_ground.claims.gradient_claim import GradientClaim, gradient_claim
 from gbas_ground.claims.orbit_claim import OrbitSite
 from gbas_ground.ionosphere.section import IonosphereSection
+from gbas_ground.monitors.b_value import BValueParams
 from gbas_ground.monitors.carrier_acceleration import CarrierAccelerationParams
 from gbas_ground.monitors.carrier_noise import CarrierNoise
-from gbas_ground.monitors.code_carrier_divergence import CcdParams
+from gbas_ground.monitors.ccd import CcdParams
+from gbas_ground.monitors.ccd_f import LARGEST_ZENITH_DELAY_M, TwoFrequencyParams
 from gbas_ground.monitors.correction_limits import CorrectionLimitsParams
 from gbas_ground.monitors.double_difference import baselines_of
 from gbas_ground.monitors.ephemeris_residual import EphemerisResidualParams
+from gbas_ground.monitors.expected_power import PowerExpectationParams
 from gbas_ground.monitors.expected_range import ExpectedRangeParams
 from gbas_ground.monitors.ionosphere_gradient import IonosphereGradientParams, gradient_site
-from gbas_ground.monitors.multiple_reference import BValueParams
-from gbas_ground.monitors.power_expectation import PowerExpectationParams
 from gbas_ground.monitors.sigma_monitor import SigmaMonitorParams
 from gbas_ground.monitors.signal_power import SignalPowerParams
-from gbas_ground.monitors.two_frequency_divergence import LARGEST_ZENITH_DELAY_M, TwoFrequencyParams
 from gbas_ground.param_checks import check_station
 from gbas_ground.sections import (
     RSDS_NONE,
@@ -251,7 +251,7 @@ class GroundParams:
         return ScheduleParams(
             station_id=self.station.id,
             slots=tuple(SLOT_NAMES.index(slot) for slot in self.vdb.slots),
-            gast_d=self.gast_d.enabled,
+            message_types=(1, 11) if self.gast_d.enabled else (1,),
             test=self.vdb.test,
             period_frames=self.vdb.period_frames,
             occupancy_min=self.vdb.occupancy_min,

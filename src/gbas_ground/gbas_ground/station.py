@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -54,17 +54,20 @@ from gbas_ground.ionosphere.protection import (
 from gbas_ground.long_term import initial_long_term, monitor_sigmas
 from gbas_ground.monitoring import MonitoringResult, MonitoringState, MonitorInputs, initial_monitoring, run_monitors
 from gbas_ground.monitors.expected_range import check_expected_range
-from gbas_ground.monitors.monitor_table import MonitorSummary, monitor_epoch, summarise
+from gbas_ground.monitors.monitor_table import Summaries, monitor_detail_epoch, monitor_epoch, summarise
 from gbas_ground.monitors.result import MonitorResult
 from gbas_ground.monitors.sigma_monitor import SigmaMonitorState
 from gbas_ground.monitors.signal_power import check_signal_power
 from gbas_ground.params import GroundParams
-from gbas_msgs_py.codes import ExclusionCause
-from gbas_msgs_py.events import Event, EventKind
-from gbas_msgs_py.records import ChannelEpoch, ChannelState, IntegrityEpoch, MonitorEpoch
+from gbas_msgs_py.codes import ChannelState, EventKind, ExclusionCause
+from gbas_msgs_py.events import Event
+from gbas_msgs_py.monitors import EXPECTED_RANGE, SIGNAL_POWER, TESTS
+from gbas_msgs_py.records import ChannelEpoch, IntegrityEpoch, MonitorDetailEpoch, MonitorEpoch
 from gbas_vdb.transmission.burst import Burst
 
 _Checks = Sequence[tuple[ExclusionCause, MonitorResult]]
+_CHECKS: Final = (EXPECTED_RANGE.key("residual"), SIGNAL_POWER.key("cn0"))
+"""Tests of single channels, in their order."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -96,7 +99,9 @@ class Monitored:
     integrity : IntegrityEpoch
         Corrections, and what may be broadcast of them.
     statistics : MonitorEpoch
-        What every monitor measured.
+        What every monitor said.
+    details : MonitorDetailEpoch
+        What is behind it.
     channels : ChannelEpoch
         State and cause of every receiver's channel of every satellite.
     events : tuple of Event
@@ -104,6 +109,7 @@ class Monitored:
 
     integrity: IntegrityEpoch
     statistics: MonitorEpoch
+    details: MonitorDetailEpoch
     channels: ChannelEpoch
     events: tuple[Event, ...]
 
@@ -277,10 +283,14 @@ def _monitor(state: IntegrityState, epoch: GroundEpoch, params: GroundParams) ->
     admitted = _admit(state, epoch, params, events)
     if admitted is None:
         refused = replace(state, refused=_refused(state, epoch), refused_key=epoch_key(epoch.gps_week, epoch.tow_s))
-        nothing = ChannelEpoch(gps_week=epoch.gps_week, tow_s=epoch.tow_s)
-        integrity = empty_integrity(epoch.gps_week, epoch.tow_s)
-        statistics = MonitorEpoch(gps_week=epoch.gps_week, tow_s=epoch.tow_s)
-        return refused, Monitored(integrity=integrity, statistics=statistics, channels=nothing, events=events.all())
+        week, tow_s = epoch.gps_week, epoch.tow_s
+        return refused, Monitored(
+            integrity=empty_integrity(week, tow_s),
+            statistics=MonitorEpoch(gps_week=week, tow_s=tow_s),
+            details=MonitorDetailEpoch(gps_week=week, tow_s=tow_s),
+            channels=ChannelEpoch(gps_week=week, tow_s=tow_s),
+            events=events.all(),
+        )
     return _process(admitted, epoch, params, events)
 
 
@@ -345,8 +355,14 @@ def _process(
         long_term=judged.long_term,
         ionosphere=ionosphere,
     )
-    statistics = monitor_epoch(*time, judged.summaries, judged.monitor_output.details, np.isfinite(integrity.state))
-    return new, Monitored(integrity=integrity, statistics=statistics, channels=channels, events=events.all())
+    shown = np.isfinite(integrity.state)
+    return new, Monitored(
+        integrity=integrity,
+        statistics=monitor_epoch(*time, judged.summaries, shown),
+        details=monitor_detail_epoch(*time, judged.monitor_output.details, shown),
+        channels=channels,
+        events=events.all(),
+    )
 
 
 class _Judged(NamedTuple):
@@ -363,7 +379,7 @@ class _Judged(NamedTuple):
     exclusions : Exclusions
         With this epoch's.
     long_term : SigmaMonitorState
-    summaries : mapping from a monitor's name to MonitorSummary
+    summaries : mapping from the numbers of a test to MonitorSummary
     findings : tuple of Finding
         Satellites, channels and receivers that were excluded, and why.
     """
@@ -374,7 +390,7 @@ class _Judged(NamedTuple):
     corrections: Corrections
     exclusions: Exclusions
     long_term: SigmaMonitorState
-    summaries: Mapping[str, MonitorSummary]
+    summaries: Summaries
     findings: tuple[Finding, ...]
 
 
@@ -400,7 +416,7 @@ def _judge(
     long_term, exclusions, of_sigmas, sigma_summaries = monitor_sigmas(
         state.long_term, corrections, exclusions, dt_s, params
     )
-    checks = zip(("range", "power"), observed.checks, strict=True)
+    checks = zip(_CHECKS, observed.checks, strict=True)
     return _Judged(
         monitoring=monitoring,
         monitor_output=monitor_output,
@@ -409,7 +425,7 @@ def _judge(
         exclusions=_advanced(exclusions, inputs, corrections, observed.channel_ok, monitor_output, dt_s, params),
         long_term=long_term,
         summaries={
-            **{name: summarise(result, observed.tracked) for name, (_, result) in checks},
+            **{key: summarise(result, observed.tracked) for key, (_, result) in checks},
             **monitor_output.summaries,
             **consistency_summaries(corrections, params),
             **sigma_summaries,
@@ -649,7 +665,7 @@ def _channel_checks(raw: RawEpoch, predicted: PredictedRanges, tracked: BoolArra
     power = check_signal_power(
         raw.cn0_dbhz[:, L1], tracked, params.signal_power.min_cn0_dbhz, required=params.signal_power.require_cn0
     )
-    return ((ExclusionCause.RANGE_RESIDUAL, residual), (ExclusionCause.SIGNAL_POWER, power))
+    return tuple((TESTS[key][1].cause, result) for key, result in zip(_CHECKS, (residual, power), strict=True))
 
 
 def _exclude_channels(exclusions: Exclusions, checks: _Checks, events: EventLog) -> Exclusions:

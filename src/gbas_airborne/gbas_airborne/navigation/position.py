@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gbas_airborne.params import AirborneParams
-from gbas_airborne.ranging.corrected_ranges import RangingSources, Rejection
+from gbas_airborne.ranging.corrected_ranges import RangingSources
 from gbas_airborne.reception.vdb_messages import Corrections, StationData
 from gbas_core.gnss.frames import azimuth_elevation, geodetic_from_ecef, rot_enu_ecef
 from gbas_core.gnss.orbits import rotated_range
@@ -32,6 +32,7 @@ from gbas_core.positioning.wls import projection_matrix, vertical_lateral
 from gbas_core.ranging.smoothing import TAU_100_S
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import CLOCK_GROUPS, missing
+from gbas_msgs_py.codes import Rejection
 
 # From east, north, up to north, west, up: the frame without an approach (forward, left, up of a north heading).
 ROT_NWU_ENU: Final[FloatArray] = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])

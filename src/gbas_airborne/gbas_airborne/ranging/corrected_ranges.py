@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from enum import IntEnum
 from functools import lru_cache
 from typing import Final
 
@@ -25,6 +24,7 @@ from gbas_core.gnss.orbits import transmit_place
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import missing, satellites_of
 from gbas_core.signals import SPEED_OF_LIGHT_MPS
+from gbas_msgs_py.codes import Rejection
 
 MILLISECOND_M: Final = 1e-3 * SPEED_OF_LIGHT_MPS
 # Uncertain, ours: a common step of code against carrier counts as whole milliseconds when it is this close to them.
@@ -34,30 +34,6 @@ _MIN_SATELLITES_FOR_STEP: Final = 3
 _MODEL_TAU_S: Final = 100.0
 # A filter is never taken to be younger than one epoch of the VDB's rate.
 _YOUNGEST_S: Final = 0.5
-
-
-class Rejection(IntEnum):
-    """Why a satellite is not used; in the order the rules are applied, the first that holds is the reason.
-
-    NO_STATION stands for all that is wrong with the station itself: none heard, no corrections, or unhealthy.
-    """
-
-    NONE = 0
-    NOT_TRACKED = 1
-    NO_STATION = 2
-    SYSTEM = 3
-    NO_CORRECTION = 4
-    CORRECTION_INVALID = 5
-    CORRECTION_AGE = 6
-    B_VALUES = 7
-    EPHEMERIS_IOD = 8
-    EPHEMERIS_CRC_MISSING = 9
-    EPHEMERIS_CRC_MISMATCH = 10
-    NOT_SETTLED = 11
-    DISTANCE = 12
-    ELEVATION = 13
-    SIGMA = 14
-    RANGE_TEST = 15
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -21,7 +21,8 @@ from gbas_core.gnss.gpstime import add_seconds, epoch_key, resolve_modified_z_co
 from gbas_core.positioning.approach import FinalApproach
 from gbas_core.record import FloatArray
 from gbas_core.satellites import SOURCE_ID_INDEX, missing
-from gbas_msgs_py.events import Event, EventKind
+from gbas_msgs_py.codes import EventKind
+from gbas_msgs_py.events import Event
 from gbas_msgs_py.records import MAX_REFERENCE_RECEIVERS
 from gbas_vdb.messages.block import MessageBlock
 from gbas_vdb.messages.types import Correction100, FasDataSet, Type1, Type2, Type4, Type11

@@ -7,7 +7,8 @@ from typing import Final
 import numpy as np
 
 from gbas_ground.consistency import Finding
-from gbas_msgs_py.events import Event, EventKind
+from gbas_msgs_py.codes import EventKind
+from gbas_msgs_py.events import Event
 
 SOURCE: Final = "ground_station"
 
