@@ -20,9 +20,9 @@ from airborne_world import (
 from gbas_airborne.navigation.guidance import alert_limits_m, in_service_volume
 from gbas_airborne.params import AirborneParams
 from gbas_airborne.reception.vdb_messages import final_approach
-from gbas_airborne.service import ApproachState, ServiceState, service_step
-from gbas_msgs_py.events import EventKind
-from gbas_msgs_py.records import ServiceType, SolutionEpoch
+from gbas_airborne.service import ServiceState, service_step
+from gbas_msgs_py.codes import ApproachState, EventKind, ServiceType
+from gbas_msgs_py.records import SolutionEpoch
 from gbas_vdb.messages.types import Type4
 
 SETTLE_S = 5.0

@@ -14,7 +14,8 @@ import pytest
 from gbas_bags.check import CheckResult, check
 from gbas_core.gnss.gpstime import from_epoch_key
 from gbas_msgs_py import topics
-from gbas_msgs_py.events import Event, EventKind
+from gbas_msgs_py.codes import EventKind
+from gbas_msgs_py.events import Event
 
 RR1 = topics.resolve(topics.GROUND_OBSERVATIONS[0])
 AIRBORNE = topics.resolve(topics.AIRBORNE_OBSERVATIONS)

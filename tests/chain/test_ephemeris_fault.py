@@ -19,8 +19,7 @@ from gbas_chain.process import NOMINAL_STATION, ProcessRequest, prepare
 from gbas_chain.results import Row
 from gbas_core.gnss.gpstime import epoch_key
 from gbas_core.satellites import SAT_INDEX
-from gbas_msgs_py.codes import ExclusionCause
-from gbas_msgs_py.records import ChannelState
+from gbas_msgs_py.codes import ChannelState, ExclusionCause
 from ground_runs import watching_monitors
 
 FOLDER = "static_pair_L1L2_1h_2010"

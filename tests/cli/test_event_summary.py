@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from gbas_cli.event_summary import event_lines
-from gbas_msgs_py.events import Event, EventKind
+from gbas_msgs_py.codes import EventKind
+from gbas_msgs_py.events import Event
 
 WEEK, NOON_S = 2400, 216_000.0  # Tuesday 2026-01-06 12:00:00
 

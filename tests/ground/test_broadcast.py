@@ -13,7 +13,7 @@ from gbas_core.satellites import IS_GPS, RANGING_SOURCE_ID, SOURCE_ID_INDEX
 from gbas_ground.broadcast import BroadcastState, broadcast_frame, empty_integrity
 from gbas_ground.params import GCID_UNHEALTHY
 from gbas_ground.station import GroundStation
-from gbas_msgs_py.records import ChannelState
+from gbas_msgs_py.codes import ChannelState
 from gbas_vdb.messages.types import Type1, Type2, Type4, Type11
 from gbas_vdb.transmission.receive import decode_burst
 from ground_runs import half_seconds, params, run

@@ -12,8 +12,7 @@ from gbas_core.satellites import N_SATS
 from gbas_core.signals import L1
 from gbas_ground.station import GroundEpoch, GroundStation, initial_state
 from gbas_msgs_py import tables
-from gbas_msgs_py.codes import ExclusionCause
-from gbas_msgs_py.records import ChannelState
+from gbas_msgs_py.codes import ChannelState, ExclusionCause
 from gbas_vdb.transmission.receive import decode_burst
 from ground_runs import params
 from synthetic_ranges import TOW_S, WEEK, truth

@@ -16,8 +16,8 @@ from gbas_ground.monitor_params import (
     MonitorParams,
     SigmaSection,
 )
-from gbas_msgs_py.codes import ExclusionCause
-from gbas_msgs_py.records import GROUND_MONITORS, ChannelState, MonitorState
+from gbas_msgs_py.codes import ChannelState, ExclusionCause, MonitorState
+from gbas_msgs_py.records import GROUND_MONITORS
 from gbas_msgs_py.tables import MONITORS
 from ground_runs import half_seconds, params, run, watching_monitors
 from synthetic_ranges import TOW_S, truth

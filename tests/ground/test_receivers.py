@@ -17,7 +17,7 @@ from gbas_core.satellites import N_SATS, SAT_INDEX
 from gbas_core.signals import SPEED_OF_LIGHT_MPS, WAVELENGTH_M
 from gbas_ground.params import GroundParams
 from gbas_ground.station import GroundEpoch, GroundStation, initial_monitor_state
-from gbas_msgs_py.records import ChannelState
+from gbas_msgs_py.codes import ChannelState
 from gbas_sim.scenario import read_sections, scenario_from_yaml
 from gbas_sim.world import World
 from ground_runs import half_seconds, params, run

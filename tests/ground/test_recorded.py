@@ -14,8 +14,8 @@ from gbas_core.io.recording import Recording
 from gbas_core.satellites import SAT_INDEX
 from gbas_ground.params import GroundParams
 from gbas_ground.station import GroundEpoch, GroundStation, initial_state
+from gbas_msgs_py.codes import ChannelState
 from gbas_msgs_py.joining import ReceptionQueue
-from gbas_msgs_py.records import ChannelState
 from ground_runs import watching_monitors
 
 SETS = yaml.safe_load((Path(__file__).parents[1] / "tables" / "recorded_sets.yaml").read_text())

@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gbas_msgs_py.events import Event, EventError, EventKind
+from gbas_msgs_py.codes import EventKind
+from gbas_msgs_py.events import Event, EventError
 
 EXAMPLE = Event(
     gps_week=2300, tow_s=12.5, kind=EventKind.EXCLUSION, subject="rr2/G05", cause="b_value", value=0.75, threshold=0.5

@@ -19,7 +19,7 @@ from gbas_chain.chain import AirborneOutput, Chain, GroundOutput
 from gbas_core.io.recording import RecordedEpoch, Recording
 from gbas_ground.params import GroundParams
 from gbas_msgs_py import tables, topics
-from gbas_msgs_py.events import EventKind
+from gbas_msgs_py.codes import EventKind
 
 pytestmark = pytest.mark.ros
 

@@ -21,8 +21,8 @@ from gbas_core.gnss.ephemeris import Ephemeris
 from gbas_core.io.recording import RecordedEpoch, Recording
 from gbas_ground.params import GroundParams
 from gbas_msgs_py import ros, tables, topics
-from gbas_msgs_py.events import EventKind
-from gbas_msgs_py.records import ProtectionEpoch, ServiceType, SolutionEpoch
+from gbas_msgs_py.codes import EventKind, ServiceType
+from gbas_msgs_py.records import ProtectionEpoch, SolutionEpoch
 
 pytestmark = pytest.mark.ros
 

@@ -20,7 +20,8 @@ from gbas_core.gnss.observations import ObservationEpoch
 from gbas_core.record import Record
 from gbas_core.satellites import SAT_INDEX
 from gbas_msgs_py import tables, topics
-from gbas_msgs_py.events import Event, EventKind
+from gbas_msgs_py.codes import EventKind
+from gbas_msgs_py.events import Event
 from gbas_msgs_py.records import IntegrityEpoch, ProtectionEpoch, SolutionEpoch
 from gbas_vdb.coding.fec import encode_fec
 from gbas_vdb.messages.block import encode_block

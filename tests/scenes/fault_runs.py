@@ -30,8 +30,8 @@ from gbas_core.satellites import N_SATS, SAT_IDS
 from gbas_core.signals import SPEED_OF_LIGHT_MPS, WAVELENGTH_M
 from gbas_ground.params import GroundParams
 from gbas_msgs_py import tables
+from gbas_msgs_py.codes import ChannelState
 from gbas_msgs_py.events import Event
-from gbas_msgs_py.records import ChannelState
 from gbas_sim.scenario import read_sections, scenario_from_mapping
 from gbas_sim.world import World
 from gbas_vdb.coding.fec import encode_fec

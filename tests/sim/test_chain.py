@@ -10,7 +10,7 @@ from gbas_chain.chain import AirborneOutput, Chain
 from gbas_core.gnss.gpstime import epoch_key
 from gbas_core.io.recording import RecordedEpoch
 from gbas_ground.params import GroundParams
-from gbas_msgs_py.records import ServiceType
+from gbas_msgs_py.codes import ServiceType
 from gbas_sim.scenario import scenario_from_mapping
 from gbas_sim.world import World
 

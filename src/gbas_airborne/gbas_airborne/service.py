@@ -13,37 +13,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from enum import IntEnum
 from typing import Final, NamedTuple
 
 from gbas_airborne.navigation.guidance import alert_limits_m
 from gbas_airborne.params import NO_FAS, AirborneParams
 from gbas_airborne.protection.levels import NOT_PROTECTED, Multipliers, ProtectionLevels, protection_levels
-from gbas_airborne.reception.vdb_messages import HEALTHY_GCID
+from gbas_airborne.reception.station_data import HEALTHY_GCID
 from gbas_core.positioning.approach import APD_C, APD_CD
-from gbas_msgs_py.events import Event, EventKind
-from gbas_msgs_py.records import ProtectionEpoch, ServiceType, SolutionEpoch
+from gbas_msgs_py.codes import ApproachState, EventKind, ServiceType
+from gbas_msgs_py.events import Event, EventLog
+from gbas_msgs_py.records import ProtectionEpoch, SolutionEpoch
 
 SERVICE_C_APD: Final = (float(APD_C), float(APD_CD))
 SOURCE: Final = "protection_level"
-
-
-class ApproachState(IntEnum):
-    """Where the receiver is between silence and guidance."""
-
-    NO_SIGNAL = 0
-    """No valid message of the station."""
-    VDB_ACQUIRED = 1
-    """Messages arrive, but not yet all that are needed (types 1 and 2, and 4 for an approach), or the station is not
-    healthy."""
-    DATA_VALID = 2
-    """All messages are there; no protected position yet."""
-    DIFFERENTIAL = 3
-    """Protected position; not, or not yet, on an approach: none selected, outside its volume, or limits exceeded."""
-    APPROACH = 4
-    """Within the service volume of the selected approach, protection levels within the alert limits."""
-    LOSS = 5
-    """Service was given and is lost."""
 
 
 class Failure(NamedTuple):
@@ -195,27 +177,14 @@ def _events(
     if (old.state, old.service, old.cause) == (new.state, new.service, new.cause):
         return ()
     found = failure or Failure(new.state, "protected", math.nan, math.nan)
-
-    def event(kind: EventKind, subject: str, cause: str, value: float, threshold: float = math.nan) -> Event:
-        return Event(
-            gps_week=solution.gps_week,
-            tow_s=solution.tow_s,
-            kind=kind,
-            subject=subject,
-            cause=cause,
-            value=value,
-            threshold=threshold,
-            source=SOURCE,
-        )
-
-    events = []
+    events = EventLog(solution.gps_week, solution.tow_s, SOURCE)
     if new.cause != old.cause:
         if failure is None:
-            events.append(event(EventKind.ALERT, "navigation", "cleared", 0.0))
+            events.add(EventKind.ALERT, "navigation", "cleared", 0.0)
         else:
-            events.append(event(EventKind.ALERT, "navigation", found.cause, found.value, found.threshold))
+            events.add(EventKind.ALERT, "navigation", found.cause, found.value, found.threshold)
     if new.service != old.service:
-        events.append(event(EventKind.SERVICE, "service", found.cause, float(new.service)))
+        events.add(EventKind.SERVICE, "service", found.cause, float(new.service))
     if new.state != old.state:
-        events.append(event(EventKind.SERVICE, "approach_state", new.state.name.lower(), float(new.state)))
-    return tuple(events)
+        events.add(EventKind.SERVICE, "approach_state", new.state.name.lower(), float(new.state))
+    return events.all()

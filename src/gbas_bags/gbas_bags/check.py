@@ -29,9 +29,9 @@ from gbas_core.gnss.gpstime import calendar_text, epoch_key, from_epoch_key
 from gbas_core.record import Record
 from gbas_core.satellites import SAT_IDS, SAT_INDEX
 from gbas_msgs_py import topics
-from gbas_msgs_py.codes import SATELLITE_MONITORS
-from gbas_msgs_py.events import Event, EventError, EventKind
-from gbas_msgs_py.records import GROUND_MONITORS, MonitorEpoch, MonitorState, ProtectionEpoch
+from gbas_msgs_py.codes import SATELLITE_MONITORS, EventKind, MonitorState
+from gbas_msgs_py.events import Event, EventError
+from gbas_msgs_py.records import GROUND_MONITORS, MonitorEpoch, ProtectionEpoch
 from gbas_msgs_py.ros import BURST_LABEL, burst_from_msg, table_from_msg
 from gbas_msgs_py.schema import SchemaError
 from gbas_vdb.transmission.receive import decode_burst

@@ -18,7 +18,7 @@ from gbas_core.gnss.gpstime import from_epoch_key
 from gbas_ground import station
 from gbas_ground.params import GroundParams
 from gbas_ground.station import GroundEpoch, GroundStation, initial_monitor_state
-from gbas_msgs_py.records import ChannelState
+from gbas_msgs_py.codes import ChannelState
 
 BUDGET_S: Final = 2e-3
 SATELLITES_A_SYSTEM: Final = 20

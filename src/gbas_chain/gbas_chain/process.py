@@ -21,7 +21,8 @@ from gbas_core.io.rinex import NavigationFile, ObservationFile
 from gbas_core.positioning.approach_keys import RECORD_KEY
 from gbas_ground.claims.broadcast_claims import statements
 from gbas_ground.params import GroundParams, ground_section
-from gbas_msgs_py.events import Event, EventKind
+from gbas_msgs_py.codes import EventKind
+from gbas_msgs_py.events import Event
 from gbas_vdb.messages.path_point import path_points_of
 
 NOMINAL_STATION = "nominal_station.yaml"

@@ -19,7 +19,8 @@ import numpy as np
 
 from gbas_core.gnss.frames import geodetic_from_ecef, rot_enu_ecef
 from gbas_core.gnss.gpstime import calendar_text
-from gbas_msgs_py.records import ProtectionEpoch, ServiceType, SolutionEpoch
+from gbas_msgs_py.codes import ServiceType
+from gbas_msgs_py.records import ProtectionEpoch, SolutionEpoch
 
 SOLUTION_HEADER = (
     "gps_week",

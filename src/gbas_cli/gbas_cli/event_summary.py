@@ -12,7 +12,8 @@ from gbas_bags.topic_names import contract_name
 from gbas_core.errors import BagError
 from gbas_core.gnss.gpstime import calendar_text
 from gbas_msgs_py import topics
-from gbas_msgs_py.events import Event, EventError, EventKind
+from gbas_msgs_py.codes import EventKind
+from gbas_msgs_py.events import Event, EventError
 
 _TITLES: Final = {
     EventKind.SERVICE: "service",

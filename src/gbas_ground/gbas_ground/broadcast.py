@@ -20,7 +20,8 @@ from gbas_ground.claims.orbit_claim import MAX_DECORRELATION
 from gbas_ground.corrections.sigma import MAX_SIGMA_M
 from gbas_ground.monitors.multiple_reference import MAX_B_VALUE_M
 from gbas_ground.params import GCID_UNHEALTHY, MAX_SIGMA_VIG, MIN_SERVICE_SATELLITES, GroundParams
-from gbas_msgs_py.records import MAX_REFERENCE_RECEIVERS, ChannelState, IntegrityEpoch
+from gbas_msgs_py.codes import ChannelState
+from gbas_msgs_py.records import MAX_REFERENCE_RECEIVERS, IntegrityEpoch
 from gbas_vdb.messages.types import Correction30, Correction100, FasDataSet, Type2
 from gbas_vdb.transmission.burst import FRAME_DURATION_S, Burst
 from gbas_vdb.transmission.schedule import (

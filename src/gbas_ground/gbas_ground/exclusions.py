@@ -17,8 +17,7 @@ from functools import cached_property
 import numpy as np
 
 from gbas_core.record import BoolArray, FloatArray, IntArray
-from gbas_msgs_py.codes import ExclusionCause
-from gbas_msgs_py.records import ChannelState
+from gbas_msgs_py.codes import ChannelState, ExclusionCause
 
 _NONE = int(ExclusionCause.NONE)  # comparing arrays with members of an enumeration is slow
 

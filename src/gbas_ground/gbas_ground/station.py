@@ -60,9 +60,9 @@ from gbas_ground.monitors.result import MonitorResult
 from gbas_ground.monitors.sigma_monitor import SigmaMonitorState
 from gbas_ground.monitors.signal_power import check_signal_power
 from gbas_ground.params import GroundParams
-from gbas_msgs_py.codes import ExclusionCause
-from gbas_msgs_py.events import Event, EventKind, EventLog
-from gbas_msgs_py.records import ChannelEpoch, ChannelState, IntegrityEpoch, MonitorEpoch
+from gbas_msgs_py.codes import ChannelState, EventKind, ExclusionCause
+from gbas_msgs_py.events import Event, EventLog
+from gbas_msgs_py.records import ChannelEpoch, IntegrityEpoch, MonitorEpoch
 from gbas_vdb.transmission.burst import Burst
 
 SOURCE: Final = "ground_station"

@@ -10,35 +10,16 @@ import json
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import Any, Final
 
 from gbas_core.gnss.gpstime import epoch_key
+from gbas_msgs_py.codes import EventKind
 
 SCHEMA: Final = "gbas/event/1"
 
 
 class EventError(ValueError):
     """Text that is not an event; the message says what was expected and found."""
-
-
-class EventKind(StrEnum):
-    """What sort of thing happened."""
-
-    EXCLUSION = "exclusion"
-    """A channel, satellite or receiver was taken out of use."""
-    READMISSION = "readmission"
-    """It was taken back into use."""
-    ALERT = "alert"
-    """Navigation must not be trusted from here on, or may be again (value 0)."""
-    SERVICE = "service"
-    """The approach service type in use changed."""
-    STATION = "station"
-    """The ground station changed what it broadcasts."""
-    INPUT = "input"
-    """A message, stream or file did not come, came late, or could not be used."""
-    FINISHED = "finished"
-    """A driver has sent its last epoch and every reader has finished with it."""
 
 
 @dataclass(frozen=True, kw_only=True)

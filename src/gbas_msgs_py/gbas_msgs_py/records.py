@@ -6,7 +6,6 @@ Satellite states and service types are small integers carried as floats (a table
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import IntEnum
 
 from gbas_core.record import FloatArray, Record, per_satellite, scalar
 
@@ -34,38 +33,6 @@ GROUND_MONITORS = (
     "sigma_spread",
 )
 """Monitors of the ground station, in the order in which tables have them."""
-
-
-class ChannelState(IntEnum):
-    """State of a satellite at the ground station, or of one receiver's channel; only USABLE is broadcast as valid."""
-
-    NOT_TRACKED = 0
-    SETTLING = 1
-    """Its filters have not run long enough."""
-    USABLE = 2
-    EXCLUDED = 3
-    """A monitor fails, or what is needed for its use is not there."""
-    RECOVERING = 4
-    """Excluded by a monitor that passes again: used after the re-admission time without a failure."""
-
-
-class MonitorState(IntEnum):
-    """What a ground monitor says of a satellite at one epoch."""
-
-    NOT_DUE = 0
-    """It does not apply: the satellite is not tracked, or the monitor needs what the station does not have."""
-    NOT_MONITORED = 1
-    """It applies, and could not look, or not yet: the satellite may not be used where the monitor is required."""
-    PASSED = 2
-    FAILED = 3
-
-
-class ServiceType(IntEnum):
-    """GBAS approach service type in use; NONE means no guidance."""
-
-    NONE = 0
-    C = 1
-    D = 2
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -13,7 +13,8 @@ from typing import Any, Final, Generic, Protocol, TypeVar
 
 from gbas_core.gnss.ephemeris import Ephemeris
 from gbas_core.gnss.gpstime import epoch_key, from_epoch_key
-from gbas_msgs_py.events import Event, EventKind
+from gbas_msgs_py.codes import EventKind
+from gbas_msgs_py.events import Event
 from gbas_msgs_py.joining import ReceptionQueue
 from gbas_msgs_py.tables import EPHEMERIS, ProgressEpoch
 from gbas_node.node import STATUS_OK, STATUS_STALE, GbasNode, NodeParams, require

@@ -26,7 +26,7 @@ from gbas_airborne.reception.vdb_messages import final_approach
 from gbas_core.gnss.frames import geodetic_from_ecef
 from gbas_core.satellites import IS_GPS, N_SATS
 from gbas_core.signals import SPEED_OF_LIGHT_MPS
-from gbas_msgs_py.records import ServiceType
+from gbas_msgs_py.codes import ServiceType
 
 # Short enough for a test, long enough for every satellite's CRC to have come round.
 PARAMS = AirborneParams(settle_s=9.0)

@@ -10,10 +10,10 @@ import pytest
 
 from airborne_world import START_S, Flight, World, above, changed, constellation, only, position_of, station_data
 from gbas_airborne.params import AirborneParams
-from gbas_airborne.ranging.corrected_ranges import Rejection, usable_b_values
+from gbas_airborne.ranging.corrected_ranges import usable_b_values
 from gbas_core.satellites import N_SATS, SAT_IDS, missing
 from gbas_core.signals import L1, SPEED_OF_LIGHT_MPS
-from gbas_msgs_py.events import EventKind
+from gbas_msgs_py.codes import EventKind, Rejection
 from gbas_vdb.messages.ephemeris_crc import ephemeris_crcs
 
 PARAMS = AirborneParams(settle_s=5.0, inflate_unsettled=False)

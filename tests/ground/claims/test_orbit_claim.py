@@ -19,8 +19,7 @@ from gbas_ground.claims.orbit_claim import (
 from gbas_ground.monitor_params import EphemerisSection, MonitorParams
 from gbas_ground.monitors.double_difference import DoubleDifferences
 from gbas_ground.monitors.ephemeris_residual import assumed_sigma_m
-from gbas_msgs_py.codes import ExclusionCause
-from gbas_msgs_py.records import ChannelState
+from gbas_msgs_py.codes import ChannelState, ExclusionCause
 from ground_runs import half_seconds, params, run
 from monitor_scenes import BRAUNSCHWEIG_M, braunschweig_station, station_of
 from synthetic_ranges import truth

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gbas_core.satellites import N_SATS, SAT_INDEX
-from gbas_msgs_py.codes import ExclusionCause
-from gbas_msgs_py.records import ChannelState
+from gbas_msgs_py.codes import ChannelState, ExclusionCause
 from gbas_msgs_py.tables import CHANNELS
 from ground_runs import half_seconds, params, run
 from synthetic_ranges import truth

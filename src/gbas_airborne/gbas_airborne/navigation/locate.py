@@ -18,8 +18,8 @@ from gbas_airborne.reception.station_data import StationData
 from gbas_airborne.reception.vdb_messages import SOURCE
 from gbas_core.record import FloatArray
 from gbas_core.satellites import SAT_IDS
-from gbas_msgs_py.codes import Rejection
-from gbas_msgs_py.events import Event, EventKind, EventLog
+from gbas_msgs_py.codes import EventKind, Rejection
+from gbas_msgs_py.events import Event, EventLog
 
 # Reasons that say nothing about a satellite itself: no event is made of them.
 _SILENT: Final = (Rejection.NO_STATION, Rejection.SYSTEM)

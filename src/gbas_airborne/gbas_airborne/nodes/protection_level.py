@@ -12,8 +12,9 @@ from gbas_airborne.nodes.configuration import receiver_params
 from gbas_airborne.receiver import AirborneReceiver
 from gbas_airborne.service import ServiceState
 from gbas_msgs_py import tables, topics
-from gbas_msgs_py.events import Event, EventKind
-from gbas_msgs_py.records import ServiceType, SolutionEpoch
+from gbas_msgs_py.codes import EventKind, ServiceType
+from gbas_msgs_py.events import Event
+from gbas_msgs_py.records import SolutionEpoch
 from gbas_msgs_py.ros import fix_from_solution
 from gbas_node.node import ConfiguredParams, GbasNode, run
 

@@ -14,7 +14,8 @@ from gbas_core.gnss.epoch_order import Arrival, EpochOrder
 from gbas_core.gnss.gpstime import epoch_key, seconds_between
 from gbas_core.gnss.observations import ObservationEpoch
 from gbas_core.positioning.approach import FinalApproach
-from gbas_msgs_py.events import Event, EventKind, EventLog
+from gbas_msgs_py.codes import EventKind
+from gbas_msgs_py.events import Event, EventLog
 from gbas_vdb.transmission.burst import Burst
 
 

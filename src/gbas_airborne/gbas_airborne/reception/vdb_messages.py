@@ -28,7 +28,8 @@ from gbas_airborne.reception.vdb_state import Counts, ReceptionState
 from gbas_core.gnss.gpstime import add_seconds, epoch_key, resolve_modified_z_count, seconds_between
 from gbas_core.positioning.approach import FinalApproach
 from gbas_core.satellites import SOURCE_ID_INDEX
-from gbas_msgs_py.events import Event, EventKind, EventLog
+from gbas_msgs_py.codes import EventKind
+from gbas_msgs_py.events import Event, EventLog
 from gbas_vdb.messages.block import MessageBlock
 from gbas_vdb.messages.types import Correction100, FasDataSet, Type1, Type2, Type4, Type11
 from gbas_vdb.transmission.burst import FRAME_DURATION_S, SLOT_NAMES, Burst

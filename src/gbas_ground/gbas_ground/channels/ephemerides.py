@@ -12,7 +12,8 @@ from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import SAT_IDS, missing
 from gbas_ground.monitors.ephemeris_change import check_ephemeris_change
 from gbas_ground.params import GroundParams
-from gbas_msgs_py.events import Event, EventKind, EventLog
+from gbas_msgs_py.codes import EventKind
+from gbas_msgs_py.events import Event, EventLog
 from gbas_vdb.messages.ephemeris_crc import ephemeris_crcs
 
 SOURCE = "ephemerides"

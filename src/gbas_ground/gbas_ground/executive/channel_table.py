@@ -12,8 +12,8 @@ from gbas_core.signals import L1
 from gbas_ground.channels.tracking import Tracks
 from gbas_ground.consistency import CorrectionInputs, Corrections, Exclusions
 from gbas_ground.executive.satellite_status import SatelliteStatus
-from gbas_msgs_py.codes import ExclusionCause
-from gbas_msgs_py.records import MAX_REFERENCE_RECEIVERS, ChannelEpoch, ChannelState
+from gbas_msgs_py.codes import ChannelState, ExclusionCause
+from gbas_msgs_py.records import MAX_REFERENCE_RECEIVERS, ChannelEpoch
 
 
 class _Entries(NamedTuple):

@@ -17,8 +17,8 @@ from gbas_ground.consistency import CorrectionInputs, Corrections, Exclusions
 from gbas_ground.corrections.sigma import MAX_SIGMA_M
 from gbas_ground.ionosphere.protection import Protection
 from gbas_ground.params import GroundParams
-from gbas_msgs_py.codes import FIRST_LATCHED, ExclusionCause
-from gbas_msgs_py.records import MAX_REFERENCE_RECEIVERS, ChannelState, IntegrityEpoch
+from gbas_msgs_py.codes import FIRST_LATCHED, ChannelState, ExclusionCause
+from gbas_msgs_py.records import MAX_REFERENCE_RECEIVERS, IntegrityEpoch
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import N_SATS, missing
 from gbas_ground.monitors.result import MonitorResult
-from gbas_msgs_py.records import GROUND_MONITORS, MonitorEpoch, MonitorState
+from gbas_msgs_py.codes import MonitorState
+from gbas_msgs_py.records import GROUND_MONITORS, MonitorEpoch
 
 IntArray = NDArray[np.intp]
 

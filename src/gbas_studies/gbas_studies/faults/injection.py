@@ -17,9 +17,10 @@ from gbas_core.gnss.gpstime import epoch_key, from_epoch_key
 from gbas_core.satellites import RANGING_SOURCE_ID, SAT_INDEX
 from gbas_ground.params import GroundParams
 from gbas_ground.station import GroundEpoch, GroundStation, Monitored, StationState, initial_state
-from gbas_msgs_py.events import Event, EventKind
+from gbas_msgs_py.codes import EventKind, MonitorState
+from gbas_msgs_py.events import Event
 from gbas_msgs_py.joining import ReceptionQueue
-from gbas_msgs_py.records import GROUND_MONITORS, MonitorState
+from gbas_msgs_py.records import GROUND_MONITORS
 from gbas_sim.atmosphere.fronts import PlasmaBubble, WedgeFront
 from gbas_sim.faults.kinds import ReceiverFault, SatelliteFault
 from gbas_sim.world import World, WorldParams

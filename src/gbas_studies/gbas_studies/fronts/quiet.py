@@ -18,7 +18,7 @@ from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import N_SATS
 from gbas_core.signals import IONO_RATIO
 from gbas_ground.params import GroundParams
-from gbas_msgs_py.records import ServiceType
+from gbas_msgs_py.codes import ServiceType
 from gbas_sim.atmosphere.fronts import WedgeFront
 from gbas_sim.atmosphere.paths import SignalPaths
 from gbas_sim.world import SimulatedEpoch, World, WorldParams
