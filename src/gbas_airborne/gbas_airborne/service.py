@@ -82,6 +82,7 @@ def service_step(
     protection = ProtectionEpoch(
         gps_week=solution.gps_week,
         tow_s=solution.tow_s,
+        mode=solution.mode,
         service=float(new.service),
         alert=float(failure is not None),
         vpl_m=float(levels.level_m[0]),

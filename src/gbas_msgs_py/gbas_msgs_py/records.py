@@ -126,6 +126,7 @@ class SolutionEpoch(Record):
     the final course; without a FAS it is to the left of north (west).
     """
 
+    mode: float = 1.0
     x_m: float = scalar("m", "ECEF position")
     y_m: float = scalar("m", "ECEF position")
     z_m: float = scalar("m", "ECEF position")
@@ -166,6 +167,7 @@ class SolutionEpoch(Record):
 class ProtectionEpoch(Record):
     """Protection levels, alert limits and the service of one airborne epoch."""
 
+    mode: float = 1.0
     service: float = scalar("-", "ServiceType in use")
     alert: float = scalar("-", "1 when navigation must not be trusted, 0 when it may")
     vpl_m: float = scalar("m", "vertical protection level")

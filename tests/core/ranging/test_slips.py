@@ -11,6 +11,7 @@ import pytest
 from gbas_core.io.rinex import read_observations
 from gbas_core.ranging.slips import (
     NORMAL_MANOEUVRE_JERK_MPS3,
+    ChannelObservations,
     SlipCause,
     SlipParams,
     SlipState,
@@ -300,6 +301,15 @@ def test_carriers_do_not_follow_what_is_no_whole_millisecond():
     cause, results, _ = run(data, SlipParams(follow_code_steps=True))
     assert (cause[20, 0, L1, SATELLITES] == SlipCause.CODE).all()
     np.testing.assert_array_equal(results[20].carrier_m, data.carrier[20])
+
+
+def test_carriers_do_not_follow_a_step_of_some_satellites():
+    """Four of ten codes step by a millisecond: each of these has slipped, and no clock has stepped."""
+    data, params = made(40, 1.0), SlipParams(follow_code_steps=True)
+    data.code[30:, :, :, SATELLITES[:4]] += MILLISECOND_M
+    causes, results, _ = run(data, params)
+    assert (results[30].clock_step_m == 0.0).all()
+    assert set(np.nonzero(causes[30].any(axis=(0, 1)))[0]) == set(SATELLITES[:4])
 
 
 def test_a_jump_of_one_code_restarts_that_satellite():

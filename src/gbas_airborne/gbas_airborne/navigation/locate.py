@@ -116,14 +116,10 @@ def _prior(before: ModePosition, received: Received, station: StationData, param
     return Prior(start_m=before.fix_m)
 
 
-def _after(
-    before: ModePosition, received: Received, result: PositionResult, params: AirborneParams
-) -> ModePosition:
+def _after(before: ModePosition, received: Received, result: PositionResult, params: AirborneParams) -> ModePosition:
     tripped = np.isfinite(result.range_error_m)
     until_ms = received.epoch_ms + 1000.0 * params.range_test_hold_s
-    after = replace(
-        before, reason=result.reason, held_until_ms=np.where(tripped, until_ms, before.held_until_ms)
-    )
+    after = replace(before, reason=result.reason, held_until_ms=np.where(tripped, until_ms, before.held_until_ms))
     if result.fix is None:
         return after
     return replace(after, fix_ms=received.epoch_ms, fix_m=result.fix.position_m)

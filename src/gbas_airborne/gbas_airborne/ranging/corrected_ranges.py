@@ -167,9 +167,7 @@ def _match(before: OwnEphemerides, iod: FloatArray, received: Received) -> OwnEp
     return OwnEphemerides(ephemeris=ephemeris, fields=fields, crc=crc)
 
 
-def ranging_sources(
-    mode: Mode, tracked: Tracked, own: OwnEphemerides, params: AirborneParams
-) -> RangingSources:
+def ranging_sources(mode: Mode, tracked: Tracked, own: OwnEphemerides, params: AirborneParams) -> RangingSources:
     """Corrected ranges of a mode, and the reason where a satellite may not be used."""
     received, ranges = tracked.received, tracked.ranges(mode)
     station, corrections = received.station, received.corrections.get(mode.product)

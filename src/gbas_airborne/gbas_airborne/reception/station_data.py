@@ -50,8 +50,8 @@ class StationData:
 class Corrections:
     """A complete set of corrections of one product (one message, or a linked pair) on the satellite axis.
 
-    `gps_week`, `tow_s` are the modified Z-count, resolved; `received` is the start of the frame it came in; `sigma_m` is
-    NaN where the correction is invalid, `listed` 1 where there is one at all, `b_m` is (4, N_SATS).
+    `gps_week`, `tow_s` are the modified Z-count, resolved, `received` is the start of the frame it came in. `sigma_m`
+    is NaN where the correction is invalid, `listed` is 1 where there is one at all, `b_m` is (4, N_SATS).
     """
 
     gps_week: int

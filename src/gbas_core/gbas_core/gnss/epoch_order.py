@@ -41,7 +41,7 @@ class RefusedEpochs:
     last_ms: int = 0
 
     def then(self, epoch_ms: int) -> RefusedEpochs:
-        """With another one: an earlier one begins the count anew, the same one again (of another source) adds nothing."""
+        """With another one: an earlier one begins the count anew, the same again (of another source) adds nothing."""
         if self.count > 0 and epoch_ms == self.last_ms:
             return self
         later = self.count > 0 and epoch_ms > self.last_ms

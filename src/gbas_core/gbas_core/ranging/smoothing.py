@@ -170,7 +170,8 @@ def _weight(count: FloatArray, elapsed_s: FloatArray, dt_s: float, params: Smoot
     """Filter weight of every time constant, (n_tau, ..., N_SATS) or broadcastable to it, where a filter goes on."""
     tau_s = np.array(params.tau_s)
     # with a time constant of 0, or an interval above it, the filter is the raw code
-    steady = np.divide(dt_s, tau_s, out=np.ones(tau_s.shape), where=tau_s > dt_s).reshape(-1, *(1,) * count.ndim)
+    share: FloatArray = np.divide(dt_s, tau_s, out=np.ones(tau_s.shape), where=tau_s > dt_s)
+    steady = share.reshape(-1, *(1,) * count.ndim)
     if params.start == "invariant":
         return steady
     if params.start == "variable":

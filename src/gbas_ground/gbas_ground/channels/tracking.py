@@ -1,8 +1,8 @@
 """What each reference receiver measured, slips found and smoothed by :mod:`gbas_core.ranging.channel_filter`.
 
-Axes are receivers, bands and satellites, ``(R, N_BANDS, N)``. A receiver that misses an epoch keeps its filters: when it comes back within the longest gap, its carrier bridges the gap, if no slip is
-found. Receivers are therefore stepped in groups of those that share their last epoch; there is one group while nobody
-misses anything.
+Axes are receivers, bands and satellites, ``(R, N_BANDS, N)``. A receiver that misses an epoch keeps its filters: when
+it comes back within the longest gap, its carrier bridges the gap, if no slip is found. Receivers are therefore stepped
+in groups of those that share their last epoch; there is one group while nobody misses anything.
 """
 
 from __future__ import annotations
