@@ -38,6 +38,14 @@ def configured_modes(params: AirborneParams) -> tuple[Mode, ...]:
     return replace(chosen[0], smoothing_s=params.smoothing_tau_s), *chosen[1:]
 
 
+def subject_prefix(number: float, params: AirborneParams) -> str:
+    """What goes before the subjects of a mode's events: nothing for the mode guidance is from, the others' names."""
+    first, *others = configured_modes(params)
+    if number == first.number:
+        return ""
+    return next((f"{mode.name}/" for mode in others if mode.number == number), f"mode {number:g}/")
+
+
 def band_of(mode: Mode) -> int:
     """Place of a mode's signal on the band axis.
 

@@ -15,6 +15,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
+from gbas_airborne.modes import subject_prefix
 from gbas_airborne.navigation.guidance import alert_limits_m
 from gbas_airborne.params import NO_FAS, AirborneParams
 from gbas_airborne.protection.levels import NOT_PROTECTED, Multipliers, ProtectionLevels, protection_levels
@@ -97,7 +98,7 @@ def service_step(
         lal_m=lal_m,
         state=float(new.state),
     )
-    return new, protection, _events(state, new, solution, failure)
+    return new, protection, _events(state, new, solution, failure, subject_prefix(solution.mode, params))
 
 
 def _message_failure(solution: SolutionEpoch, params: AirborneParams) -> Failure | None:
@@ -173,7 +174,7 @@ def _next_state(state: ServiceState, solution: SolutionEpoch, failure: Failure |
 
 
 def _events(
-    old: ServiceState, new: ServiceState, solution: SolutionEpoch, failure: Failure | None
+    old: ServiceState, new: ServiceState, solution: SolutionEpoch, failure: Failure | None, prefix: str
 ) -> tuple[Event, ...]:
     if (old.state, old.service, old.cause) == (new.state, new.service, new.cause):
         return ()
@@ -181,11 +182,11 @@ def _events(
     events = EventLog(solution.gps_week, solution.tow_s, SOURCE)
     if new.cause != old.cause:
         if failure is None:
-            events.add(EventKind.ALERT, "navigation", "cleared", 0.0)
+            events.add(EventKind.ALERT, prefix + "navigation", "cleared", 0.0)
         else:
-            events.add(EventKind.ALERT, "navigation", found.cause, found.value, found.threshold)
+            events.add(EventKind.ALERT, prefix + "navigation", found.cause, found.value, found.threshold)
     if new.service != old.service:
-        events.add(EventKind.SERVICE, "service", found.cause, float(new.service))
+        events.add(EventKind.SERVICE, prefix + "service", found.cause, float(new.service))
     if new.state != old.state:
-        events.add(EventKind.SERVICE, "approach_state", new.state.name.lower(), float(new.state))
+        events.add(EventKind.SERVICE, prefix + "approach_state", new.state.name.lower(), float(new.state))
     return events.all()

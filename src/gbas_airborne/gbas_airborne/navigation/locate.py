@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from gbas_airborne.modes import subject_prefix
 from gbas_airborne.navigation.position import PositionInputs, PositionResult, Prior, tested_position
 from gbas_airborne.params import AirborneParams
 from gbas_airborne.ranging.corrected_ranges import Corrected, RangingSources
@@ -75,12 +76,11 @@ def locate(state: LocateState, corrected: Corrected, params: AirborneParams) -> 
     received, states = corrected.received, dict(state.modes)
     results: list[PositionResult] = []
     events: list[Event] = []
-    for place, sources in enumerate(corrected.sources):
+    for sources in corrected.sources:
         mode = sources.mode
         before = states.get(mode.number, ModePosition())
         result = _position(before, received, sources, params)
-        prefix = f"{mode.name}/" if place else ""
-        events += _changes(before.reason, result, received, prefix, params)
+        events += _changes(before.reason, result, received, params)
         states[mode.number] = _after(before, received, result, params)
         results.append(result)
     return LocateState(modes=states), Located(received=received, results=tuple(results), events=tuple(events))
@@ -126,9 +126,10 @@ def _after(before: ModePosition, received: Received, result: PositionResult, par
 
 
 def _changes(
-    before: NDArray[np.int64], result: PositionResult, received: Received, prefix: str, params: AirborneParams
+    before: NDArray[np.int64], result: PositionResult, received: Received, params: AirborneParams
 ) -> tuple[Event, ...]:
-    """An event for each satellite whose reason changed; the mode beside the first is in the subject."""
+    """An event for each satellite whose reason changed."""
+    prefix = subject_prefix(result.sources.mode.number, params)
     events = EventLog(received.gps_week, received.tow_s, SOURCE)
     for index in np.flatnonzero(before != result.reason):
         old, new = Rejection(before[index]), Rejection(result.reason[index])
