@@ -145,11 +145,11 @@ def receive(state: ReceiveState, epoch: AirborneEpoch, params: AirborneParams) -
 def _admit(state: ReceiveState, epoch: AirborneEpoch, events: EventLog) -> tuple[ReceiveState, Arrival]:
     """Whether the epoch comes after the last one; a state that starts anew when time goes on from an earlier one."""
     order, arrival = state.order.step(epoch.epoch_ms)
-    since_s = state.order.since_last_s(epoch.epoch_ms)
+    back_s = -state.order.since_last_s(epoch.epoch_ms)
     if arrival is Arrival.REFUSED:
-        events.add(EventKind.INPUT, "observations", "time_backwards", since_s, 0.0)
+        events.add(EventKind.INPUT, "observations", "time_backwards", back_s, 0.0)
     elif arrival is Arrival.RESTART:
-        events.add(EventKind.INPUT, "observations", "time_restart", since_s)
+        events.add(EventKind.INPUT, "observations", "time_restart", back_s)
         # what was received stays true; it is not sent again
         return ReceiveState(order=order, ephemerides=state.ephemerides), arrival
     return replace(state, order=order), arrival
