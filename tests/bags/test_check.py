@@ -81,7 +81,7 @@ def test_cut_payload_is_named(checked: Any) -> None:
 def test_unknown_schema_version_is_named(checked: Any) -> None:
     def change(fake: Any) -> None:
         key, data = fake.content[SOLUTION][5]
-        fake.content[SOLUTION][5] = (key, data.replace(b"gbas/solution/1", b"gbas/solution/9"))
+        fake.content[SOLUTION][5] = (key, data.replace(b"gbas/solution/2", b"gbas/solution/9"))
 
     result = checked(change)
     assert (SOLUTION, 5) in [(problem.topic, problem.index) for problem in result.problems]
@@ -93,7 +93,7 @@ def test_schema_of_another_topic_is_named(checked: Any) -> None:
         fake.content[SOLUTION][5] = fake.content[PROTECTION][5]
 
     result = checked(change)
-    assert any(problem.index == 5 and "expected 'gbas/solution/1'" in problem.what for problem in result.problems)
+    assert any(problem.index == 5 and "expected 'gbas/solution/2'" in problem.what for problem in result.problems)
 
 
 def test_wrong_crc_of_a_message_block_is_named(checked: Any, tmp_path: Path) -> None:

@@ -46,6 +46,7 @@ from gbas_core.gnss.observations import ObservationEpoch
 from gbas_core.satellites import N_SATS, RANGING_SOURCE_ID, SAT_INDEX
 from gbas_ground.broadcast import BroadcastState
 from gbas_ground.station import GroundStation
+from gbas_msgs_py.products import L1_100
 from gbas_msgs_py.records import IntegrityEpoch, SolutionEpoch
 from gbas_vdb.messages.types import Correction100, Message, Type1, Type2
 from gbas_vdb.transmission.burst import Burst
@@ -732,26 +733,26 @@ def test_damaged_integrity_is_not_broadcast(records, name, value):
     for satellite, (measurement, first_p) in _sent(damaged, chain).items():
         for column, (low, high) in SENDABLE.items():
             number = getattr(damaged, column)
-            assert low <= (number if np.ndim(number) == 0 else number[satellite]) <= high, column
-        b_m = damaged.b_m[:, satellite]
+            sent = np.asarray(number if np.ndim(number) == 0 else number[..., satellite])  # of every product
+            assert ((low <= sent) & (sent <= high)).all(), column
+        b_m = damaged.b_m[L1_100, :, satellite]
         assert (np.isnan(b_m) | (np.abs(b_m) <= 6.35)).all()
-        assert np.isnan(first_p) or first_p >= damaged.p_ephemeris[satellite]
+        assert np.isnan(first_p) or first_p >= damaged.p_ephemeris[L1_100, satellite]
         assert measurement.iod == damaged.iod[satellite] % 256  # IODnav has 10 bits, the message sends 8
         # Half a step of the messages: 0.01 m, 0.001 m/s, 0.05 m; sigmas go up to the next 0.02 m.
-        assert measurement.prc_m == pytest.approx(damaged.prc_100_m[satellite], abs=0.0051)
-        assert measurement.rrc_mps == pytest.approx(damaged.rrc_100_mps[satellite], abs=0.00051)
+        assert measurement.prc_m == pytest.approx(damaged.prc_m[L1_100, satellite], abs=0.0051)
+        assert measurement.rrc_mps == pytest.approx(damaged.rrc_mps[L1_100, satellite], abs=0.00051)
         assert measurement.b_values_m == pytest.approx(tuple(b_m), abs=0.0251, nan_ok=True)
-        assert 0.0 <= measurement.sigma_pr_gnd_m - damaged.sigma_pr_gnd_m[satellite] + 1e-6 < 0.021
+        assert 0.0 <= measurement.sigma_pr_gnd_m - damaged.sigma_pr_gnd_m[L1_100, satellite] + 1e-6 < 0.021
 
 
 # Bounds of the fields, ICAO Annex 10 vol. I, tables B-64, B-65 and B-70; a correction and its rate beyond their own
 # limits, and a station without a receiver or with more than four, are not sent either.
 SENDABLE: dict[str, tuple[float, float]] = {
     "state": (2, 2), "n_receivers": (1, 4), "sigma_vert_iono_gradient": (0.0, 25.5e-6), "iod": (0, 1023),
-    "ephemeris_crc": (0, 0xFFFF), "p_ephemeris": (0.0, 1.275e-3), "p_ephemeris_d": (0.0, 1.275e-3),
-    "prc_100_m": (-327.67, 327.67), "prc_30_m": (-327.67, 327.67),
-    "rrc_100_mps": (-32.767, 32.767), "rrc_30_mps": (-32.767, 32.767),
-    "sigma_pr_gnd_m": (1e-300, 5.08), "sigma_pr_gnd_d_m": (1e-300, 5.08), "sigma_pr_gnd_30_m": (1e-300, 5.08),
+    "ephemeris_crc": (0, 0xFFFF), "p_ephemeris": (0.0, 1.275e-3),
+    "prc_m": (-327.67, 327.67), "rrc_mps": (-32.767, 32.767),
+    "sigma_pr_gnd_m": (1e-300, 5.08), "sigma_pr_gnd_d_m": (1e-300, 5.08),
 }  # fmt: skip
 
 
@@ -775,9 +776,9 @@ def _sent(integrity: IntegrityEpoch, chain: Any) -> dict[int, tuple[Correction10
 
 # What a protection level, a limit or the service is made of; the others are for people.
 MATTERS = (
-    "x_m", "y_m", "z_m", "n_receivers", "correction_age_s", "message_age_s", "gcid", "k_md_e", "fasval_m", "faslal_m",
-    "apd", "d_vert_m", "d_lat_m", "s_vert", "s_lat", "sigma_gnd_m", "sigma_air_m", "sigma_tropo_m", "sigma_iono_m",
-    "b_m", "ephemeris_error_m",
+    "mode", "x_m", "y_m", "z_m", "n_receivers", "correction_age_s", "message_age_s", "gcid", "k_md_e", "fasval_m",
+    "faslal_m", "apd", "d_vert_m", "d_lat_m", "s_vert", "s_lat", "sigma_gnd_m", "sigma_air_m", "sigma_tropo_m",
+    "sigma_iono_m", "b_m", "ephemeris_error_m",
 )  # fmt: skip
 
 

@@ -14,6 +14,7 @@ from gbas_ground.broadcast import BroadcastState, broadcast_frame, empty_integri
 from gbas_ground.params import GCID_UNHEALTHY
 from gbas_ground.station import GroundStation
 from gbas_msgs_py.codes import ChannelState
+from gbas_msgs_py.products import L1_30, L1_100, PRODUCT_INDEX
 from gbas_vdb.messages.types import Type1, Type2, Type4, Type11
 from gbas_vdb.transmission.receive import decode_burst
 from ground_runs import half_seconds, params, run
@@ -59,11 +60,11 @@ def test_corrections_arrive_within_half_of_the_last_bit(full):
     assert len(sent) > 18  # a linked pair
     for each in sent:
         satellite = SOURCE_ID_INDEX[each.ranging_source_id]
-        assert each.prc_m == pytest.approx(integrity.prc_100_m[satellite], abs=HALF["prc"] + EPSILON)
-        assert each.rrc_mps == pytest.approx(integrity.rrc_100_mps[satellite], abs=HALF["rrc"] + EPSILON)
-        assert each.b_values_m == pytest.approx(integrity.b_m[:, satellite], abs=HALF["b"] + EPSILON)
+        assert each.prc_m == pytest.approx(integrity.prc_m[L1_100, satellite], abs=HALF["prc"] + EPSILON)
+        assert each.rrc_mps == pytest.approx(integrity.rrc_mps[L1_100, satellite], abs=HALF["rrc"] + EPSILON)
+        assert each.b_values_m == pytest.approx(integrity.b_m[L1_100][:, satellite], abs=HALF["b"] + EPSILON)
         # never below, and less than one bit above
-        assert -EPSILON <= each.sigma_pr_gnd_m - integrity.sigma_pr_gnd_m[satellite] < SIGMA_LSB
+        assert -EPSILON <= each.sigma_pr_gnd_m - integrity.sigma_pr_gnd_m[L1_100, satellite] < SIGMA_LSB
         assert each.iod == integrity.iod[satellite]
 
 
@@ -74,10 +75,10 @@ def test_thirty_second_corrections_arrive(full):
     assert len(sent) == (integrity.state == ChannelState.USABLE).sum()
     for each in sent:
         satellite = SOURCE_ID_INDEX[each.ranging_source_id]
-        assert each.prc_30_m == pytest.approx(integrity.prc_30_m[satellite], abs=HALF["prc"] + EPSILON)
-        assert each.rrc_30_mps == pytest.approx(integrity.rrc_30_mps[satellite], abs=HALF["rrc"] + EPSILON)
+        assert each.prc_30_m == pytest.approx(integrity.prc_m[L1_30, satellite], abs=HALF["prc"] + EPSILON)
+        assert each.rrc_30_mps == pytest.approx(integrity.rrc_mps[L1_30, satellite], abs=HALF["rrc"] + EPSILON)
         assert -EPSILON <= each.sigma_pr_gnd_d_m - integrity.sigma_pr_gnd_d_m[satellite] < SIGMA_LSB
-        assert -EPSILON <= each.sigma_pr_gnd_30_m - integrity.sigma_pr_gnd_30_m[satellite] < SIGMA_LSB
+        assert -EPSILON <= each.sigma_pr_gnd_30_m - integrity.sigma_pr_gnd_m[L1_30, satellite] < SIGMA_LSB
 
 
 def test_first_measurement_owns_crc_and_rotates(full):
@@ -89,7 +90,8 @@ def test_first_measurement_owns_crc_and_rotates(full):
             if message.measurements:
                 satellite = SOURCE_ID_INDEX[message.measurements[0].ranging_source_id]
                 assert message.ephemeris_crc == integrity.ephemeris_crc[satellite]
-                assert message.ephemeris_decorrelation == pytest.approx(integrity.p_ephemeris[satellite], abs=1e-12)
+                p = integrity.p_ephemeris[L1_100, satellite]
+                assert message.ephemeris_decorrelation == pytest.approx(p, abs=1e-12)
                 first[satellite] = True
     # 10 s of frames, two messages each: every satellite was first (Annex 10, App. B 3.6.7.2.2.8: once per 10 s)
     assert set(first) == set(np.flatnonzero(out.integrity[-1].state == ChannelState.USABLE))
@@ -143,9 +145,10 @@ def test_default_gcid_is_unhealthy():
 @pytest.mark.parametrize(
     ("field", "value"),
     [
-        ("prc_100_m", np.nan), ("prc_100_m", 400.0), ("prc_30_m", np.inf),
-        ("rrc_100_mps", -4.0), ("rrc_30_mps", np.nan),
-        ("sigma_pr_gnd_m", 0.0), ("sigma_pr_gnd_m", 5.09), ("sigma_pr_gnd_m", np.nan), ("sigma_pr_gnd_30_m", np.nan),
+        ("prc_m/l1_100", np.nan), ("prc_m/l1_100", 400.0), ("prc_m/l1_30", np.inf),
+        ("rrc_mps/l1_100", -4.0), ("rrc_mps/l1_30", np.nan),
+        ("sigma_pr_gnd_m/l1_100", 0.0), ("sigma_pr_gnd_m/l1_100", 5.09), ("sigma_pr_gnd_m/l1_100", np.nan),
+        ("sigma_pr_gnd_m/l1_30", np.nan), ("sigma_pr_gnd_d_m", 0.0), ("p_ephemeris/l1_30", np.nan),
         ("iod", np.nan), ("ephemeris_crc", np.nan), ("state", float(ChannelState.EXCLUDED)), ("state", np.nan),
         ("state", float(ChannelState.SETTLING)),
     ],
@@ -155,9 +158,10 @@ def test_incomplete_satellite_is_not_sent(full, field, value):
     station, out = full
     integrity = out.integrity[-1]
     satellite = int(np.flatnonzero(integrity.state == ChannelState.USABLE)[2])
-    values = getattr(integrity, field).copy()
-    values[satellite] = value
-    _, bursts = GroundStation.broadcast(BroadcastState(), dataclasses.replace(integrity, **{field: values}), station)
+    name, _, product = field.partition("/")
+    values = getattr(integrity, name).copy()
+    values[(PRODUCT_INDEX[product], satellite) if product else satellite] = value
+    _, bursts = GroundStation.broadcast(BroadcastState(), dataclasses.replace(integrity, **{name: values}), station)
     sent = {each.ranging_source_id for message in messages(bursts, Type1) for each in message.measurements}
     assert int(RANGING_SOURCE_ID[satellite]) not in sent
     assert len(sent) == (integrity.state == ChannelState.USABLE).sum() - 1
@@ -168,7 +172,7 @@ def test_b_value_beyond_the_field_is_not_sent(full):
     integrity = out.integrity[-1]
     satellite = int(np.flatnonzero(integrity.state == ChannelState.USABLE)[0])
     b = integrity.b_m.copy()
-    b[1, satellite] = 6.4
+    b[L1_100, 1, satellite] = 6.4
     _, bursts = GroundStation.broadcast(BroadcastState(), dataclasses.replace(integrity, b_m=b), station)
     sent = {each.ranging_source_id for message in messages(bursts, Type1) for each in message.measurements}
     assert int(RANGING_SOURCE_ID[satellite]) not in sent

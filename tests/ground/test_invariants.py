@@ -13,6 +13,7 @@ from gbas_core.signals import L1
 from gbas_ground.station import GroundEpoch, GroundStation, initial_state
 from gbas_msgs_py import tables
 from gbas_msgs_py.codes import ChannelState, ExclusionCause
+from gbas_msgs_py.products import L1_30, L1_100
 from gbas_vdb.transmission.receive import decode_burst
 from ground_runs import params
 from synthetic_ranges import TOW_S, WEEK, truth
@@ -49,15 +50,16 @@ def damaged(observed, rng, rate):
 def check(integrity, station):
     """What must hold of every integrity epoch."""
     usable = integrity.state == ChannelState.USABLE
-    for name in ("prc_100_m", "prc_30_m", "rrc_100_mps", "rrc_30_mps", "sigma_pr_gnd_m", "sigma_pr_gnd_30_m"):
-        assert np.array_equal(np.isfinite(getattr(integrity, name)), usable), name
-    assert (np.abs(integrity.prc_100_m[usable]) <= station.max_prc_m).all()
-    assert (np.abs(integrity.rrc_30_mps[usable]) <= station.max_rrc_mps).all()
+    for name in ("prc_m", "rrc_mps", "sigma_pr_gnd_m"):
+        for product in (L1_100, L1_30):
+            assert np.array_equal(np.isfinite(getattr(integrity, name)[product]), usable), name
+    assert (np.abs(integrity.prc_m[L1_100, usable]) <= station.max_prc_m).all()
+    assert (np.abs(integrity.rrc_mps[L1_30, usable]) <= station.max_rrc_mps).all()
     assert (integrity.cause[usable] == ExclusionCause.NONE).all()
     assert (integrity.elevation_rad[usable] >= station.elevation_mask_rad).all()
-    used = integrity.receiver_used[: station.n_receivers, usable] == 1.0
+    used = integrity.receiver_used[L1_100][: station.n_receivers, usable] == 1.0
     assert (used.sum(axis=0) >= station.min_receivers).all()
-    b = integrity.b_m[: station.n_receivers, usable]
+    b = integrity.b_m[L1_100][: station.n_receivers, usable]
     several = used.sum(axis=0) >= 2
     assert np.array_equal(np.isfinite(b), used & several)
     assert np.abs(np.where(np.isfinite(b), b, 0.0).sum(axis=0)).max(initial=0.0) < 1e-6

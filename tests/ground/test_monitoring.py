@@ -16,8 +16,8 @@ from gbas_ground.monitor_params import (
     MonitorParams,
     SigmaSection,
 )
-from gbas_msgs_py.codes import ChannelState, ExclusionCause, MonitorState
-from gbas_msgs_py.records import GROUND_MONITORS
+from gbas_msgs_py.codes import ChannelState, ExclusionCause, MonitorState, Signal
+from gbas_msgs_py.monitors import TESTS
 from gbas_msgs_py.tables import MONITORS
 from ground_runs import half_seconds, params, run, watching_monitors
 from synthetic_ranges import TOW_S, truth
@@ -48,7 +48,7 @@ def excluded_by(out, satellite="G02"):
 
 def states_of(out, monitor):
     """States of a monitor, ``(epochs, N)``."""
-    return np.array([each.state[GROUND_MONITORS.index(monitor)] for each in out.statistics])
+    return np.array([each.states(monitor) for each in out.statistics])
 
 
 def test_code_that_drifts_away_from_its_carrier():
@@ -152,12 +152,15 @@ def test_a_quiet_station_passes_everything_and_every_table_can_be_sent():
     out = run(truth(4), params(4), half_seconds(40))
     last = out.statistics[-1]
     usable = out.integrity[-1].state == ChannelState.USABLE
-    state = dict(zip(GROUND_MONITORS, last.state[:, usable], strict=True))
-    passing = {name for name, each in state.items() if (each == MonitorState.PASSED).all()}
+    tests = {(monitor.name, test.name) for monitor, test in TESTS.values()}
+    passing = {each for each in tests if (last.states(*each)[usable] == MonitorState.PASSED).all()}
     # the synthetic ranges are on L1 alone, so that there is nothing for the two-band monitors
-    assert passing == set(GROUND_MONITORS) - {"ccd_f", "ccd_f_paper"}
+    assert passing == tests - {("ccd_f", "full_rank"), ("ccd_f", "published")}
+    assert not len(last.select(monitor="ccd_f"))
+    assert set(last.signal.tolist()) <= {Signal.L1, Signal.NONE}
     for each in out.statistics:
         again = MONITORS.decode(MONITORS.label, MONITORS.encode(each))
+        assert np.array_equal(again.state, each.state)
         assert np.array_equal(again.statistic, each.statistic, equal_nan=True)
 
 

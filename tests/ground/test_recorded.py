@@ -16,6 +16,7 @@ from gbas_ground.params import GroundParams
 from gbas_ground.station import GroundEpoch, GroundStation, initial_state
 from gbas_msgs_py.codes import ChannelState
 from gbas_msgs_py.joining import ReceptionQueue
+from gbas_msgs_py.products import L1_30, L1_100
 from ground_runs import watching_monitors
 
 SETS = yaml.safe_load((Path(__file__).parents[1] / "tables" / "recorded_sets.yaml").read_text())
@@ -79,9 +80,9 @@ def test_two_receivers_38_m_apart_agree(upc):
     assert not usable[:230].any()  # filters settle for 230 s
     assert not [event for event in events if event.cause in ("b_value", "receiver_fault", "prc_limit", "rrc_limit")]
 
-    b = stacked(integrity, "b_m")
+    b = stacked(integrity, "b_m")[:, L1_100]
     assert np.abs(np.nansum(b, axis=1)).max() < 1e-6  # of one satellite: zero but for rounding
-    sigma = stacked(integrity, "sigma_pr_gnd_m")
+    sigma = stacked(integrity, "sigma_pr_gnd_m")[:, L1_100]
     # Centred over satellites by the removal of the clocks (plain mean over the common set of all satellites used).
     assert np.abs(np.nanmean(np.where(np.isfinite(sigma), b[:, 0], np.nan)[250:], axis=1)).max() < 0.1
     # B / sigma_B stays well inside designator A, and is not suspiciously small: multipath of metres, smoothed.
@@ -92,7 +93,7 @@ def test_two_receivers_38_m_apart_agree(upc):
 
 def test_corrections_are_those_of_the_atmosphere(upc):
     integrity, _ = upc
-    prc, elevation = stacked(integrity, "prc_100_m"), stacked(integrity, "elevation_rad")
+    prc, elevation = stacked(integrity, "prc_m")[:, L1_100], stacked(integrity, "elevation_rad")
     usable = np.isfinite(prc)
     # Troposphere 2.4 m and a quiet ionosphere some metres at the zenith, ten times that at 5 degrees, less the mean.
     assert np.abs(prc[usable]).max() < 40.0
@@ -101,12 +102,12 @@ def test_corrections_are_those_of_the_atmosphere(upc):
         np.corrcoef(p[u], 1.0 / np.sin(e[u]))[0, 1] for p, e, u in zip(prc, elevation, usable, strict=True) if u.any()
     ]
     assert np.mean(order) < -0.8
-    assert np.nanmax(np.abs(stacked(integrity, "rrc_100_mps"))) < 0.1
+    assert np.nanmax(np.abs(stacked(integrity, "rrc_mps")[:, L1_100])) < 0.1
 
 
 def test_thirty_and_hundred_seconds_agree_on_a_quiet_day(upc):
     integrity, _ = upc
-    difference = stacked(integrity, "prc_100_m") - stacked(integrity, "prc_30_m")
+    difference = stacked(integrity, "prc_m")[:, L1_100] - stacked(integrity, "prc_m")[:, L1_30]
     assert 0.01 < np.nanstd(difference) < 1.0
 
 
@@ -127,7 +128,7 @@ def test_faulty_ephemeris_of_g17_never_comes_into_use(data_dir, faulty):
     told = [event for event in events if event.cause == "ephemeris_change" and event.subject == "G17"]
     assert len(told) == int(faulty)
     assert all(event.value > 1000.0 for event in told)
-    prc = stacked(integrity, "prc_100_m")
+    prc = stacked(integrity, "prc_m")[:, L1_100]
     assert np.isfinite(prc[:, SAT_INDEX["G17"]]).sum() > 60
     assert np.nanmax(np.abs(prc)) < 40.0
 
@@ -145,6 +146,6 @@ def test_gps_and_galileo(data_dir, name):
     assert usable[-1, 32:].sum() >= 6
     assert np.isnan(stacked(integrity, "b_m")).all()  # one receiver
     for constellation in (slice(0, 32), slice(32, 68)):
-        prc = stacked(integrity, "prc_100_m")[-1, constellation]
+        prc = stacked(integrity, "prc_m")[-1, L1_100, constellation]
         assert np.nansum(prc) == pytest.approx(0.0, abs=1e-6)  # a plain mean was removed
         assert np.nanmax(np.abs(prc)) < 40.0

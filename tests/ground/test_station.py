@@ -16,7 +16,7 @@ from gbas_core.signals import L1, SPEED_OF_LIGHT_MPS
 from gbas_ground.monitor_params import ExpectedPowerSection, MonitorParams, PowerSection
 from gbas_ground.station import GroundEpoch, GroundStation
 from gbas_msgs_py.codes import ChannelState, ExclusionCause, MonitorState
-from gbas_msgs_py.records import GROUND_MONITORS
+from gbas_msgs_py.products import L1_30, L1_100
 from ground_runs import half_seconds, params, run, watching_monitors
 from synthetic_ranges import TOW_S, WEEK, constellation, truth
 
@@ -47,13 +47,12 @@ def test_correction_is_minus_the_error_less_what_the_clock_takes(receivers):
     assert usable(last).sum() > 20
     expected = without_mean(-error, usable(last))
     tolerance = NOISE_FREE_M + 3e-6 * np.abs(error).max()
-    for name in ("prc_100_m", "prc_30_m"):
-        assert np.nanmax(np.abs(getattr(last, name) - expected)) < tolerance
-    for name in ("rrc_100_mps", "rrc_30_mps"):
+    for product in (L1_100, L1_30):
+        assert np.nanmax(np.abs(last.prc_m[product] - expected)) < tolerance
         # satellites move by some 0.1 m/s in range rate over the run
-        assert np.nanmax(np.abs(getattr(last, name))) < 1e-6
-    b = last.b_m[:receivers][:, usable(last)]
-    assert np.isnan(last.b_m[receivers:]).all()
+        assert np.nanmax(np.abs(last.rrc_mps[product])) < 1e-6
+    b = last.b_m[L1_100, :receivers][:, usable(last)]
+    assert np.isnan(last.b_m[:, receivers:]).all()
     assert np.isnan(b).all() if receivers == 1 else np.abs(b).max() < tolerance
     assert last.n_receivers == receivers
 
@@ -63,9 +62,9 @@ def test_rate_follows_a_drifting_error():
     out = run(truth(3), params(3), half_seconds(40), code_error_m=lambda second: drift * second)
     last = out.integrity[-1]
     expected = without_mean(-drift, usable(last))
-    assert np.nanmax(np.abs(last.rrc_100_mps - expected)) < 1e-6  # the drift is 2e-2 of that over c
-    change = out.integrity[-1].prc_30_m - out.integrity[-2].prc_30_m
-    assert np.nanmax(np.abs(last.rrc_30_mps - change / 0.5)) < 1e-6
+    assert np.nanmax(np.abs(last.rrc_mps[L1_100] - expected)) < 1e-6  # the drift is 2e-2 of that over c
+    change = out.integrity[-1].prc_m[L1_30] - out.integrity[-2].prc_m[L1_30]
+    assert np.nanmax(np.abs(last.rrc_mps[L1_30] - change / 0.5)) < 1e-6
 
 
 def test_b_values_of_a_bias():
@@ -79,8 +78,8 @@ def test_b_values_of_a_bias():
     n = (usable(last) & IS_GPS).sum()
     # PR_sc = -error: B has the opposite sign of a range error
     left = -bias * (1.0 - 1.0 / n)
-    assert last.b_m[:, where] == pytest.approx([-left / 12, -left / 12, left / 4, -left / 12], abs=1e-5)
-    assert np.nanmax(np.abs(last.b_m.sum(axis=0))) < NOISE_FREE_M
+    assert last.b_m[L1_100, :, where] == pytest.approx([-left / 12, -left / 12, left / 4, -left / 12], abs=1e-5)
+    assert np.nanmax(np.abs(last.b_m[L1_100].sum(axis=0))) < NOISE_FREE_M
 
 
 def test_nothing_is_usable_before_the_filters_have_settled():
@@ -91,7 +90,7 @@ def test_nothing_is_usable_before_the_filters_have_settled():
     assert (states[:first, here] == ChannelState.SETTLING).all()
     assert (out.array("cause")[:first, here] == ExclusionCause.SETTLING).all()
     assert (states[first:, here] == ChannelState.USABLE).all()
-    assert np.isnan(out.array("prc_100_m")[:first]).all()
+    assert np.isnan(out.array("prc_m")[:first]).all()
     assert [event[0] for event in out.told("settling")] == [8.0] * int(here.sum())
     assert out.told("corrections_begin") == [(8.0, "station", "station")]
 
@@ -127,7 +126,7 @@ def test_faulty_channel_is_excluded_and_comes_back_after_the_clear_time():
     assert [event[1:] for event in told] == [("exclusion", "rr2/G02"), ("readmission", "rr2/G02")]
     excluded, back = told[0][0], told[1][0]
     assert 20.0 <= excluded <= 23.0  # 2 s filters
-    used = out.array("receiver_used")[:, 1, SAT_INDEX["G02"]]
+    used = out.array("receiver_used")[:, L1_100, 1, SAT_INDEX["G02"]]
     seconds = np.array(out.seconds)
     assert (used[(seconds >= excluded) & (seconds < back)] == 0.0).all()
     assert (used[(seconds >= 5.0) & (seconds < excluded)] == 1.0).all()
@@ -137,7 +136,7 @@ def test_faulty_channel_is_excluded_and_comes_back_after_the_clear_time():
     # the satellite stays usable with the other two, and nothing else is touched
     state = out.array("state")[seconds >= 5.0, SAT_INDEX["G02"]]
     assert (state == ChannelState.USABLE).all()
-    others = np.delete(out.array("prc_100_m")[seconds >= 5.0], SAT_INDEX["G02"], axis=1)
+    others = np.delete(out.array("prc_m")[seconds >= 5.0, L1_100], SAT_INDEX["G02"], axis=1)
     present = np.isfinite(others).all(axis=0)
     assert present.sum() > 20
 
@@ -148,10 +147,10 @@ def test_excluded_channel_leaves_no_trace_in_the_corrections():
     error = step_on(4, 0, "G02", 9.0, 10.0)
     out = run(truth(4), station, half_seconds(80), code_error_m=error, carrier_error_m=quiet)
     last = out.integrity[-1]
-    assert last.receiver_used[:, SAT_INDEX["G02"]].tolist() == [0.0, 1.0, 1.0, 1.0]
-    assert np.nanmax(np.abs(last.prc_100_m)) < NOISE_FREE_M
-    assert np.nanmax(np.abs(last.b_m)) < NOISE_FREE_M
-    assert np.isnan(last.b_m[0, SAT_INDEX["G02"]])
+    assert last.receiver_used[L1_100, :, SAT_INDEX["G02"]].tolist() == [0.0, 1.0, 1.0, 1.0]
+    assert np.nanmax(np.abs(last.prc_m[L1_100])) < NOISE_FREE_M
+    assert np.nanmax(np.abs(last.b_m[L1_100])) < NOISE_FREE_M
+    assert np.isnan(last.b_m[L1_100, 0, SAT_INDEX["G02"]])
 
 
 def test_two_receivers_exclude_the_satellite_and_bring_it_back():
@@ -174,7 +173,7 @@ def test_two_receivers_exclude_the_satellite_and_bring_it_back():
     assert (state[between][: changes[0] + 1] == ChannelState.EXCLUDED).all()
     assert (state[between][changes[0] + 1 :] == ChannelState.RECOVERING).all()
     assert (out.array("cause")[between, SAT_INDEX["G02"]] == ExclusionCause.B_VALUE).all()
-    assert np.isnan(out.array("prc_100_m")[between, SAT_INDEX["G02"]]).all()
+    assert np.isnan(out.array("prc_m")[between, L1_100, SAT_INDEX["G02"]]).all()
     assert state[-1] == ChannelState.USABLE
     assert 40.0 < told[1][0] < 50.0
 
@@ -195,11 +194,11 @@ def test_receiver_with_several_faults_is_excluded_whole():
     seconds = np.array(out.seconds)
     between = (seconds >= told[0][0]) & (seconds < told[1][0])
     assert (out.array("n_receivers")[between] == 3.0).all()
-    assert (np.nan_to_num(out.array("receiver_used")[between, 3]) == 0.0).all()
+    assert (np.nan_to_num(out.array("receiver_used")[between, L1_100, 3]) == 0.0).all()
     assert out.integrity[-1].n_receivers == 4.0
     assert (out.array("state")[seconds >= 5.0] == ChannelState.USABLE).sum(axis=1).min() >= 20
     # sigma is that of three receivers meanwhile, so larger
-    sigma = out.array("sigma_pr_gnd_m")[:, SAT_INDEX["G10"]]
+    sigma = out.array("sigma_pr_gnd_m")[:, L1_100, SAT_INDEX["G10"]]
     assert (sigma[between] > sigma[seconds == 9.0]).all()
 
 
@@ -231,10 +230,10 @@ def test_correction_limit(sign):
     station = params(3, max_range_residual_m=1000.0)
     last = run(truth(3), station, half_seconds(20), code_error_m=lambda _: error).integrity[-1]
     assert last.cause[SAT_INDEX["G02"]] == ExclusionCause.PRC_LIMIT
-    assert np.isnan(last.prc_100_m[SAT_INDEX["G02"]])
+    assert np.isnan(last.prc_m[L1_100, SAT_INDEX["G02"]])
     assert (last.cause[usable(last)] == 0).all()
     assert usable(last).sum() > 20
-    assert np.nanmax(np.abs(last.prc_100_m)) < NOISE_FREE_M
+    assert np.nanmax(np.abs(last.prc_m[L1_100])) < NOISE_FREE_M
 
 
 def test_rate_limit():
@@ -245,7 +244,7 @@ def test_rate_limit():
     told = out.told("rrc_limit")
     assert told[0][1:] == ("exclusion", "G02")
     assert out.integrity[-1].cause[SAT_INDEX["G02"]] == ExclusionCause.RRC_LIMIT
-    assert np.isnan(out.integrity[-1].rrc_100_mps[SAT_INDEX["G02"]])
+    assert np.isnan(out.integrity[-1].rrc_mps[L1_100, SAT_INDEX["G02"]])
 
 
 def test_gross_error_of_one_channel_never_enters_the_corrections():
@@ -256,7 +255,7 @@ def test_gross_error_of_one_channel_never_enters_the_corrections():
     assert told[0][0] == 10.0
     assert told[1][0] == 21.0  # last failure at 10.5, 10 s clear, next epoch
     late = np.array(out.seconds) >= 5.5
-    assert np.nanmax(np.abs(out.array("prc_100_m")[late])) < NOISE_FREE_M
+    assert np.nanmax(np.abs(out.array("prc_m")[late, L1_100])) < NOISE_FREE_M
     assert (out.array("state")[late, SAT_INDEX["G02"]] == ChannelState.USABLE).all()
 
 
@@ -269,11 +268,11 @@ def test_weak_signal_is_not_used(missing_cn0):
 
     out = run(truth(3), params(3), half_seconds(40), change=weak)
     assert out.told("signal_power") == [(10.0, "exclusion", "rr3/G05")]
-    assert out.integrity[-1].receiver_used[:, SAT_INDEX["G05"]].tolist()[:3] == [1.0, 1.0, 0.0]
+    assert out.integrity[-1].receiver_used[L1_100, :, SAT_INDEX["G05"]].tolist()[:3] == [1.0, 1.0, 0.0]
 
 
 def test_one_name_is_one_monitor():
-    """What the monitors' table calls `power` is what the section `power` tells to watch only, and no other."""
+    """What the monitors' table calls `signal_power` is what the section `power` tells to watch only, and no other."""
 
     def weak(second, observed):
         if second >= 10.0:
@@ -283,10 +282,10 @@ def test_one_name_is_one_monitor():
     def told(**sections):
         station = params(4, monitors=dataclasses.replace(MonitorParams(), **sections))
         out = run(truth(4), station, half_seconds(40), change=weak)
-        rows = [GROUND_MONITORS.index(name) for name in ("power", "expected_power")]
-        assert (out.statistics[-1].state[rows, SAT_INDEX["G05"]] == MonitorState.FAILED).any()
+        states = [out.statistics[-1].states(name)[SAT_INDEX["G05"]] for name in ("signal_power", "expected_power")]
+        assert MonitorState.FAILED in states
         causes = {cause for cause in ("signal_power", "expected_power") if out.told(cause)}
-        return causes, out.integrity[-1].receiver_used[2, SAT_INDEX["G05"]] == 1.0
+        return causes, out.integrity[-1].receiver_used[L1_100, 2, SAT_INDEX["G05"]] == 1.0
 
     power, expected = {"power": PowerSection(exclude=False)}, {"expected_power": ExpectedPowerSection(exclude=False)}
     assert told() == ({"signal_power"}, False)  # the averaged one is slower, and does not look at what is out
@@ -322,7 +321,8 @@ def test_ephemeris_change_does_not_jump_the_rate():
     out = run(
         world, params(3), half_seconds(300), ephemerides={0.0: (later(first, -1000.0),), 10.0: (second,)}
     )  # fmt: skip
-    iod, rrc, prc = (out.array(name) for name in ("iod", "rrc_100_mps", "prc_100_m"))
+    iod = out.array("iod")
+    rrc, prc = (out.array(name)[:, L1_100] for name in ("rrc_mps", "prc_m"))
     here = usable(out.integrity[-1])
     switch = int(np.argmax(iod[:, np.argmax(here)] == 18.0))
     assert out.seconds[switch] == 130.0
@@ -348,7 +348,7 @@ def test_implausible_ephemeris_is_not_used():
     last = out.integrity[-1]
     assert last.iod[SAT_INDEX["G02"]] == 17.0
     assert last.iod[SAT_INDEX["G01"]] == 18.0
-    assert np.nanmax(np.abs(last.prc_100_m)) < NOISE_FREE_M
+    assert np.nanmax(np.abs(last.prc_m[L1_100])) < NOISE_FREE_M
 
 
 def test_unhealthy_satellite_is_dropped_at_once():
@@ -390,9 +390,9 @@ def test_millisecond_jumps_of_a_receiver_clock(code_only):
     count = (out.array("state")[late] == ChannelState.USABLE).sum(axis=1)
     assert count.min() == count.max() > 20
     assert (out.array("n_receivers")[late] == 3.0).all()
-    assert np.nanmax(np.abs(out.array("prc_100_m")[late])) < NOISE_FREE_M
-    assert np.nanmax(np.abs(out.array("b_m")[late])) < NOISE_FREE_M
-    assert np.nanmax(np.abs(out.array("rrc_100_mps")[late])) < 1e-5
+    assert np.nanmax(np.abs(out.array("prc_m")[late, L1_100])) < NOISE_FREE_M
+    assert np.nanmax(np.abs(out.array("b_m")[late, L1_100])) < NOISE_FREE_M
+    assert np.nanmax(np.abs(out.array("rrc_mps")[late, L1_100])) < 1e-5
 
 
 def test_receiver_missing_for_an_epoch_keeps_its_filters():
@@ -408,7 +408,7 @@ def test_receiver_missing_for_an_epoch_keeps_its_filters():
     assert out.told("missing") == [(10.0, "input", "rr2"), (12.0, "input", "rr2")]
     assert out.told("back") == [(10.5, "input", "rr2"), (13.0, "input", "rr2")]
     late = seconds >= 5.5
-    assert np.nanmax(np.abs(out.array("rrc_100_mps")[late])) < 1e-6
+    assert np.nanmax(np.abs(out.array("rrc_mps")[late, L1_100])) < 1e-6
     usable_count = (out.array("state")[late] == ChannelState.USABLE).sum(axis=1)
     assert usable_count.min() == usable_count.max()
 
@@ -446,8 +446,8 @@ def test_bad_numbers_never_reach_a_correction(field, bad):
 
     out = run(truth(3), params(3), half_seconds(30), change=spoil)
     late = np.array(out.seconds) >= 5.5
-    for name in ("prc_100_m", "prc_30_m"):
-        values = out.array(name)[late]
+    for product in (L1_100, L1_30):
+        values = out.array("prc_m")[late, product]
         assert np.isfinite(values).sum(axis=1).min() > 15
         assert np.nanmax(np.abs(values)) < 1e-5
     assert np.isfinite(out.array("n_receivers")).all()
@@ -469,7 +469,7 @@ def test_intervals_may_change():
     out = run(truth(3), params(3), seconds, code_error_m=lambda second: drift * second)
     late = seconds >= 5.5
     expected = without_mean(-drift, usable(out.integrity[-1]))
-    rate = out.array("rrc_100_mps")[late]
+    rate = out.array("rrc_mps")[late, L1_100]
     assert np.nanmax(np.abs(rate - expected)) < 1e-5  # 0.25 s: rounding of 2e7 m over less time
     assert (out.array("state")[late] == ChannelState.USABLE).sum(axis=1).min() > 20
 
@@ -497,7 +497,7 @@ def test_week_rollover(normalised):
         results.append(integrity)
         assert not [event for event in events if event.cause == "epoch_not_later"]
     assert all(usable(each).sum() > 20 for each in results[11:])
-    assert max(np.nanmax(np.abs(each.rrc_100_mps)) for each in results[11:]) < 1e-6
+    assert max(np.nanmax(np.abs(each.rrc_mps[L1_100])) for each in results[11:]) < 1e-6
 
 
 def test_epoch_that_is_not_later_is_refused():
@@ -577,7 +577,7 @@ def test_same_input_gives_the_same_bits():
         for _ in range(2)
     )
     assert once.bursts == again.bursts
-    for name in ("prc_100_m", "b_m", "rrc_30_mps"):
+    for name in ("prc_m", "b_m", "rrc_mps"):
         assert np.array_equal(once.array(name), again.array(name), equal_nan=True)
 
 

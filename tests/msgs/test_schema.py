@@ -18,6 +18,8 @@ from gbas_core.gnss.observations import ObservationEpoch
 from gbas_core.record import columns_of
 from gbas_core.satellites import N_SATS, RANGING_SOURCE_ID
 from gbas_msgs_py import tables
+from gbas_msgs_py.codes import Signal
+from gbas_msgs_py.monitors import TESTS
 from gbas_msgs_py.schema import SchemaError, TableSchema
 
 SCHEMAS = list(tables.SCHEMAS.values())
@@ -32,7 +34,13 @@ def random_record(schema: TableSchema[Any], seed: int, satellites: list[int], od
     """A record with values, holes, and `odd` somewhere, for the satellites at these places of the axis."""
     rng = np.random.default_rng(seed)
     values: dict[str, Any] = {"gps_week": int(rng.integers(0, 65536)), "tow_s": float(rng.uniform(0, 604800))}
+    rows = random_keys(schema, rng, len(satellites))
     for item, spec in columns_of(schema.record_type):
+        if spec.row:
+            quantity = np.where(rng.random(len(satellites)) < 0.3, np.nan, rng.normal(size=len(satellites)) * odd)
+            coded = rng.choice(np.array(spec.codes or [0.0], dtype=np.float64), size=len(satellites))
+            values[item.name] = rows.get(item.name, quantity if spec.codes is None else coded)
+            continue
         if not spec.satellite:
             values[item.name] = float(rng.choice([rng.normal() * 1e7, np.nan, odd]))
             continue
@@ -43,6 +51,15 @@ def random_record(schema: TableSchema[Any], seed: int, satellites: list[int], od
         array[..., satellites] = picked
         values[item.name] = array
     return schema.record_type(**values)
+
+
+def random_keys(schema: TableSchema[Any], rng: np.random.Generator, count: int) -> dict[str, np.ndarray]:
+    """Columns that say what a row of the monitors table is about: no two rows the same."""
+    if not schema.has_rows:
+        return {}
+    every = [(*test, sat, signal) for test in TESTS for sat in RANGING_SOURCE_ID for signal in Signal]
+    chosen = np.array(every, dtype=np.float64)[rng.permutation(len(every))[:count]].reshape(count, 4)
+    return dict(zip(("monitor", "test", "sat", "signal"), chosen.T, strict=True))
 
 
 def bits(record: Any) -> dict[str, bytes]:
@@ -73,7 +90,7 @@ def test_round_trip_is_exact_to_the_bit(schema: TableSchema[Any], seed: int, sat
     assert schema.encode(again).tobytes() == table.tobytes()
 
 
-@pytest.mark.parametrize("schema", [s for s in SCHEMAS if s.has_satellites], ids=lambda s: s.name)
+@pytest.mark.parametrize("schema", [s for s in SCHEMAS if s.has_satellites or s.has_rows], ids=lambda s: s.name)
 def test_an_epoch_without_satellites_is_one_marker_row(schema: TableSchema[Any]) -> None:
     table = schema.encode(schema.record_type(gps_week=2300, tow_s=0.5))
     assert table.shape == (1, len(schema.columns))
@@ -215,7 +232,7 @@ def test_unknown_labels_are_refused_by_name(label: str, complaint: str) -> None:
 
 
 def test_another_schema_is_refused_by_a_reader_that_expects_one() -> None:
-    with pytest.raises(SchemaError, match="gbas/truth/1"):
+    with pytest.raises(SchemaError, match="gbas/truth/2"):
         tables.PROGRESS.decode(tables.TRUTH.label, np.array([[2300.0, 0.5]]))
 
 

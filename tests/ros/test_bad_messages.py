@@ -102,7 +102,7 @@ def test_a_nan_in_a_value_is_a_missing_value(launcher: Any, probe: Any) -> None:
     message = table(tables.OBSERVATIONS, observed(10.0), code_l1_m=np.nan)
     probe.publisher(topics.GROUND_OBSERVATIONS[0]).publish(message)
     probe.until(lambda: integrity, "the epoch")
-    assert np.isnan(integrity[0].prc_100_m).all()
+    assert np.isnan(integrity[0].prc_m).all()
 
 
 def test_correction_broadcast(launcher: Any, probe: Any) -> None:

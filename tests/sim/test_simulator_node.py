@@ -120,6 +120,9 @@ def test_what_arrives_is_what_the_world_made(sent, world):
         truth = sent[topics.TRUTH_AIRBORNE][number]
         np.testing.assert_array_equal([truth.x_m, truth.y_m, truth.z_m], made.truth.position_m)
         np.testing.assert_array_equal([truth.vx_mps, truth.vy_mps, truth.vz_mps], made.truth.velocity_mps)
+        attitude = [made.truth.roll_rad, made.truth.pitch_rad, made.truth.heading_rad]
+        np.testing.assert_array_equal([truth.roll_rad, truth.pitch_rad, truth.heading_rad], attitude)
+        assert np.isfinite(attitude).all()
     np.testing.assert_array_equal(sent[topics.EPHEMERIS][0].af0_s, world.ephemeris.af0_s)
 
 

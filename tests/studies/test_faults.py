@@ -86,7 +86,7 @@ def test_a_divergence_is_told_before_the_error_passes_its_limit(settled):
     reaction = inject(settled, (fault,), satellite, onset_s, 60.0)
     assert reaction.burst_s < divergence_limit_s(0.3, Smoothing())
     assert reaction.cause in ("code_carrier_divergence", "two_frequency_divergence")
-    assert set(reaction.failed_s) & {"ccd", "ccd_f"}
+    assert set(reaction.failed_s) & {"ccd/rate", "ccd_f/full_rank"}
 
 
 def test_without_a_fault_nothing_happens(settled):

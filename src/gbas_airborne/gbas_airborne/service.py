@@ -15,7 +15,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
-from gbas_airborne.modes import subject_prefix
+from gbas_airborne.modes import configured_modes, subject_prefix
 from gbas_airborne.navigation.guidance import alert_limits_m
 from gbas_airborne.params import NO_FAS, AirborneParams
 from gbas_airborne.protection.levels import NOT_PROTECTED, Multipliers, ProtectionLevels, protection_levels
@@ -136,6 +136,8 @@ def _position_failure(solution: SolutionEpoch, params: AirborneParams) -> Failur
         return Failure(valid, "correction_age", solution.correction_age_s, params.correction_timeout_s)
     if not math.isfinite(solution.x_m + solution.y_m + solution.z_m):
         return Failure(valid, "no_position", solution.n_sats, math.nan)
+    if solution.mode not in [mode.number for mode in configured_modes(params)]:
+        return Failure(valid, "mode_without_service", solution.mode, math.nan)
     if params.require_ephemeris_bound and not solution.k_md_e > 0.0:
         return Failure(valid, "no_ephemeris_bound", solution.k_md_e, math.nan)
     return None

@@ -22,6 +22,7 @@ from gbas_bags import epochs
 from gbas_bags.mcap_log import METADATA_FILE, BagWriter, Topic
 from gbas_bags.mcap_scan import Channel, Damage, McapScan, Message
 from gbas_bags.topic_names import is_observation
+from gbas_bags.versions import older_tables, table_identifier
 from gbas_core.errors import BagError
 from gbas_core.gnss.gpstime import from_epoch_key
 
@@ -162,11 +163,14 @@ class _TopicSummary:
     first_epoch: int | None = None
     last_epoch: int | None = None
     bytes: int = 0
+    schemas: set[str] = field(default_factory=set)
 
     def add(self, message: Message) -> None:
         self.count += 1
         self.bytes += len(message.data)
         try:
+            if self.msgtype == epochs.TABLE_TYPE:
+                self.schemas.add(table_identifier(message.data))
             key = epochs.epoch_of(self.msgtype, message.data)
         except epochs.PayloadError:
             return
@@ -195,6 +199,11 @@ class BagInfo:
         """All messages that could be read."""
         return sum(topic.count for topic in self.topics.values())
 
+    @property
+    def older_tables(self) -> dict[str, str]:
+        """Tables of an older version, each with the version that is read."""
+        return older_tables(each for topic in self.topics.values() for each in topic.schemas)
+
     def as_json(self) -> dict[str, Any]:
         """The summary as JSON-able data."""
         suite = self.metadata.get(SUITE_METADATA, {})
@@ -215,10 +224,12 @@ class BagInfo:
             "end": _calendar(self.last_ns) if self.messages else None,
             "epochs": _epoch_range(self.epochs),
             "messages": self.messages,
+            "older_tables": self.older_tables,
             "topics": [
                 {
                     "topic": name,
                     "type": topic.msgtype,
+                    "schemas": sorted(topic.schemas - {""}),
                     "messages": topic.count,
                     "bytes": topic.bytes,
                     "first_epoch": _epoch_json(topic.first_epoch),

@@ -8,13 +8,13 @@ from __future__ import annotations
 import contextlib
 import itertools
 import math
+import struct
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
 from mcap.reader import make_reader
 from mcap.stream_reader import StreamReader
 from rosbags.highlevel import AnyReader
@@ -25,13 +25,15 @@ from gbas_bags import epochs
 from gbas_bags.bags import METADATA_FILE, bag_files
 from gbas_bags.mcap_scan import McapScan, Message
 from gbas_bags.topic_names import contract_name, is_ephemeris, is_observation, is_progress, split
+from gbas_bags.versions import older_tables, older_text, table_identifier, version_read
 from gbas_core.gnss.gpstime import calendar_text, epoch_key, from_epoch_key
 from gbas_core.record import Record
-from gbas_core.satellites import SAT_IDS, SAT_INDEX
+from gbas_core.satellites import SAT_INDEX
 from gbas_msgs_py import topics
-from gbas_msgs_py.codes import SATELLITE_MONITORS, EventKind, MonitorState
+from gbas_msgs_py.codes import EventKind, MonitorState
 from gbas_msgs_py.events import Event, EventError
-from gbas_msgs_py.records import GROUND_MONITORS, MonitorEpoch, ProtectionEpoch
+from gbas_msgs_py.monitors import monitor_named, traced_causes
+from gbas_msgs_py.records import MonitorEpoch, ProtectionEpoch
 from gbas_msgs_py.ros import BURST_LABEL, burst_from_msg, table_from_msg
 from gbas_msgs_py.schema import SchemaError
 from gbas_vdb.transmission.receive import decode_burst
@@ -40,6 +42,12 @@ MAX_PROBLEMS: Final = 1000
 """More are counted but not listed."""
 UNFINISHED_EPOCHS: Final = 16
 """Epochs at either end of a recording that may be without outputs: they were under way."""
+_GROUND_OUTPUTS: Final = (
+    topics.GROUND_INTEGRITY,
+    topics.GROUND_MONITORS,
+    topics.GROUND_MONITOR_DETAILS,
+    topics.GROUND_CHANNELS,
+)
 _COMPARING_CAUSES: Final = ("_above_", "timeout")
 
 
@@ -115,6 +123,7 @@ def check(path: Path) -> CheckResult:
         result.messages += count
         _check_with_mcap(file, count, result)
     _check_with_rosbags(path, result)
+    contents.check_versions()
     contents.check_order()
     contents.check_frames()
     contents.check_alerts()
@@ -194,7 +203,9 @@ class _Contents:
         self._protection: dict[str, list[tuple[int, int, str, ProtectionEpoch]]] = defaultdict(list)
         self._alerts: dict[int, list[Event]] = defaultdict(list)
         self._exclusions: list[Event] = []
-        self._failed: dict[tuple[int, str, str], tuple[float, float]] = {}
+        self._failed: dict[tuple[int, str, str], list[tuple[float, float]]] = defaultdict(list)
+        self._traced = traced_causes()
+        self._older: Counter[tuple[str, str, str]] = Counter()
         self._specs = {topics.resolve(spec.name): spec for spec in topics.TOPICS}
 
     def read(self, file: Path) -> int:
@@ -218,6 +229,9 @@ class _Contents:
             self._result.problem(Problem(what, file, topic, index))
 
         self._sequence(file, topic, message, wrong)
+        if self._is_older(file, topic, message):
+            self._keep_place(topic, message)
+            return
         try:
             decoded = self._deserialised(message)
             self._contract(file, topic, index, message, decoded)
@@ -226,6 +240,17 @@ class _Contents:
             self._keep_place(topic, message)
             return
         self._result.checked["payloads decoded"] += 1
+
+    def _is_older(self, file: str, topic: str, message: Message) -> bool:
+        """Whether it is a table of an older version, which is told once."""
+        identifier = ""
+        if message.channel.schema.name == epochs.TABLE_TYPE:
+            with contextlib.suppress(epochs.PayloadError, struct.error):
+                identifier = table_identifier(message.data)
+        if version_read(identifier) is None:
+            return False
+        self._older[file, topic, identifier] += 1
+        return True
 
     def _keep_place(self, topic: str, message: Message) -> None:
         """A message that cannot be used is not missing as well."""
@@ -269,7 +294,7 @@ class _Contents:
             event = Event.from_json(decoded.data)
             if event.kind is EventKind.ALERT:
                 self._alerts[event.epoch].append(event)
-            elif event.kind is EventKind.EXCLUSION and event.cause in SATELLITE_MONITORS and event.subject in SAT_INDEX:
+            elif event.kind is EventKind.EXCLUSION and event.cause in self._traced and event.subject in SAT_INDEX:
                 self._exclusions.append(event)
 
     def _table(self, file: str, topic: str, index: int, decoded: Any, schema: str | None) -> None:
@@ -282,9 +307,10 @@ class _Contents:
         if isinstance(record, ProtectionEpoch):
             self._protection[topic].append((key, index, file, record))
         elif isinstance(record, MonitorEpoch):
-            for row, satellite in np.argwhere(record.state == MonitorState.FAILED):
-                values = float(record.statistic[row, satellite]), float(record.threshold[row, satellite])
-                self._failed[key, GROUND_MONITORS[row], SAT_IDS[satellite]] = values
+            for row in record.rows():
+                if row.state is MonitorState.FAILED:
+                    cause = monitor_named(row.monitor).test(row.test).cause.word
+                    self._failed[key, cause, row.sat].append((row.statistic, row.threshold))
 
     def _burst(self, file: str, topic: str, index: int, decoded: Any) -> None:
         burst = burst_from_msg(decoded)
@@ -297,6 +323,17 @@ class _Contents:
             errors = decode_burst(burst).errors
             if errors:
                 raise SchemaError(f"{BURST_LABEL}: {errors[0].reason}")
+
+    # --- versions
+
+    def check_versions(self) -> None:
+        """Tables of an older version cannot be checked."""
+        for (file, topic, identifier), count in self._older.items():
+            what = f"{count} tables are {identifier}, and {version_read(identifier)} is read: not checked"
+            self._result.problem(Problem(what, file, topic))
+        older = older_tables(identifier for _, _, identifier in self._older)
+        if older:
+            self._result.notes.append(f"written with {older_text(older)}")
 
     # --- order and completeness
 
@@ -319,7 +356,7 @@ class _Contents:
     def _outputs(self, observed: list[int]) -> None:
         for topic, series in self._series.items():
             namespace, name = split(topic)
-            if name in (topics.GROUND_INTEGRITY, topics.GROUND_MONITORS, topics.GROUND_CHANNELS):
+            if name in _GROUND_OUTPUTS:
                 self._complete(topic, series, observed, "was observed")
             elif name in (topics.AIRBORNE_SOLUTION, topics.AIRBORNE_PROTECTION):
                 source = self._series.get(f"{namespace}/{topics.AIRBORNE_OBSERVATIONS}")
@@ -383,11 +420,10 @@ class _Contents:
     def check_exclusions(self) -> None:
         """Each satellite a monitor excluded must have failed in that monitor's table, by the same value."""
         topic = topics.resolve(topics.GROUND_MONITORS)
-        if topic not in self._series:
+        if topic not in self._series or any(topic == older for _, older, _ in self._older):
             return
         for event in self._exclusions:
-            names = SATELLITE_MONITORS[event.cause]
-            measured = [self._failed.get((event.epoch, name, event.subject)) for name in names]
+            measured = self._failed.get((event.epoch, event.cause, event.subject), [])
             if (event.value, event.threshold) not in measured:
                 what = f"the exclusion of {event.subject} at {_epoch(event.epoch)} by {event.cause} is not in the table"
                 self._result.problem(Problem(what, self._series[topic].file, topic))

@@ -256,7 +256,7 @@ def replay(
             if topic.explanation():
                 print(f"  {topic.explanation()}")
         print_places({"bag": result.replayed})
-    if not result.identical:
+    if result.differs:
         raise typer.Exit(EXIT_INTERNAL)
 
 
@@ -400,6 +400,7 @@ def sim_export(
 def info(bag: BagPath, as_json: Json = False) -> None:
     """Topics, counts, duration, epochs, whether simulated, and which version wrote it."""
     from gbas_bags import bags
+    from gbas_bags.versions import older_text
 
     document = bags.info(bag).as_json()
     if as_json:
@@ -417,6 +418,7 @@ def info(bag: BagPath, as_json: Json = False) -> None:
         "duration": f"{document['duration_s']:.3f} s, from {document['start']} (GPS time)",
         "epochs": "none" if epochs is None else _epochs_text(epochs),
         "messages": str(document["messages"]),
+        "tables": older_text(document["older_tables"]) if document["older_tables"] else "of this version",
         "lost in transport": "not known" if document["lost_in_transport"] is None else document["lost_in_transport"],
     }
     for name, value in lines.items():

@@ -58,6 +58,12 @@ class ReplayResult:
         """Whether every recorded output came out again, bit for bit."""
         return bool(self.topics) and all(topic.same for topic in self.topics)
 
+    @property
+    def differs(self) -> bool:
+        """Whether anything that can be compared did not come out again, or nothing can be compared."""
+        compared = [topic for topic in self.topics if not topic.older]
+        return not compared or not all(topic.same for topic in compared)
+
     def as_json(self) -> dict[str, Any]:
         """The result as JSON-able data."""
         return {
@@ -73,6 +79,7 @@ class ReplayResult:
                     "different": topic.different,
                     "missing": topic.missing,
                     "extra": topic.extra,
+                    "older": topic.older or None,
                     "first_difference": topic.first_difference,
                 }
                 for topic in self.topics

@@ -6,6 +6,7 @@ the air with an empty type 1 message and says that it is not healthy.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Final
@@ -21,7 +22,9 @@ from gbas_ground.corrections.sigma import MAX_SIGMA_M
 from gbas_ground.monitors.multiple_reference import MAX_B_VALUE_M
 from gbas_ground.params import GCID_UNHEALTHY, MAX_SIGMA_VIG, MIN_SERVICE_SATELLITES, GroundParams
 from gbas_msgs_py.codes import ChannelState
+from gbas_msgs_py.products import PRODUCTS
 from gbas_msgs_py.records import MAX_REFERENCE_RECEIVERS, IntegrityEpoch
+from gbas_vdb.messages.tables import CORRECTION_ENTRIES
 from gbas_vdb.messages.types import Correction30, Correction100, FasDataSet, Type2
 from gbas_vdb.transmission.burst import FRAME_DURATION_S, Burst
 from gbas_vdb.transmission.schedule import (
@@ -35,6 +38,12 @@ from gbas_vdb.transmission.schedule import (
 
 _FRAME_MS: Final = round(1000 * FRAME_DURATION_S)
 _IOD_MODULUS: Final = 256
+_WITH_B_VALUES: Final = frozenset(
+    kind
+    for kind, layout in CORRECTION_ENTRIES.items()
+    if any(getattr(entry, "name", None) == "b_values_m" for entry in layout.entries)
+)
+"""Types of messages that carry B values."""
 _MAX_CRC: Final = 0xFFFF
 _MAX_IOD: Final = np.where(IS_GALILEO, 1023, 255)  # Known: IODnav has 10 bits, IODE 8
 
@@ -61,18 +70,18 @@ def empty_integrity(gps_week: int, tow_s: float) -> IntegrityEpoch:
 
 def broadcastable(integrity: IntegrityEpoch, params: GroundParams) -> BoolArray:
     """Satellites whose corrections are usable, complete and within what the messages can carry, ``(N,)``."""
-    b = np.where(np.isnan(integrity.b_m), 0.0, np.abs(integrity.b_m)).max(axis=0)
     ok = (integrity.state == ChannelState.USABLE) & _counts(integrity.iod) & _counts(integrity.ephemeris_crc)
     ok = ok & (integrity.ephemeris_crc <= _MAX_CRC) & (integrity.iod <= _MAX_IOD)
-    for decorrelation in (integrity.p_ephemeris, integrity.p_ephemeris_d):
+    # all that the station makes must be whole, whether a message carries it or not
+    for product in range(len(params.tau_s)):
+        decorrelation, sigma = integrity.p_ephemeris[product], integrity.sigma_pr_gnd_m[product]
         ok = ok & (decorrelation >= 0.0) & (decorrelation <= MAX_DECORRELATION)
-    for prc, rrc in (
-        (integrity.prc_100_m, integrity.rrc_100_mps),
-        (integrity.prc_30_m, integrity.rrc_30_mps),
-    ):
-        ok = ok & (np.abs(prc) <= params.max_prc_m) & (np.abs(rrc) <= params.max_rrc_mps)
-    for sigma in (integrity.sigma_pr_gnd_m, integrity.sigma_pr_gnd_d_m, integrity.sigma_pr_gnd_30_m):
+        ok = ok & (np.abs(integrity.prc_m[product]) <= params.max_prc_m)
+        ok = ok & (np.abs(integrity.rrc_mps[product]) <= params.max_rrc_mps)
         ok = ok & (sigma > 0.0) & (sigma <= MAX_SIGMA_M)
+    ok = ok & (integrity.sigma_pr_gnd_d_m > 0.0) & (integrity.sigma_pr_gnd_d_m <= MAX_SIGMA_M)
+    b_m = integrity.b_m[[index for index, product in enumerate(PRODUCTS) if product.message_type in _WITH_B_VALUES]]
+    b = np.where(np.isnan(b_m), 0.0, np.abs(b_m)).max(axis=(0, 1))
     return np.asarray(ok & (b <= MAX_B_VALUE_M))
 
 
@@ -143,38 +152,56 @@ def _sources(
     integrity: IntegrityEpoch, satellites: tuple[int, ...], params: GroundParams
 ) -> tuple[SourceCorrection, ...]:
     """All there is to send of the satellites."""
-    chosen = list(satellites)
-    names = ("iod", "ephemeris_crc", "prc_100_m", "rrc_100_mps", "sigma_pr_gnd_m", "p_ephemeris", "p_ephemeris_d")
-    columns = [getattr(integrity, name)[chosen].tolist() for name in names]
-    b_values = integrity.b_m[:, chosen].T.tolist()
-    thirty = _corrections_30(integrity, chosen) if params.gast_d else [None] * len(chosen)
+    chosen, types = list(satellites), params.schedule().message_types
+    sent = [(index, product) for index, product in enumerate(PRODUCTS) if product.message_type in types]
+    corrections = {
+        product.message_type: _ENTRIES[product.message_type](integrity, index, chosen) for index, product in sent
+    }
+    decorrelation = {product.message_type: integrity.p_ephemeris[index, chosen].tolist() for index, product in sent}
     return tuple(
         SourceCorrection(
-            correction=Correction100(
-                ranging_source_id=number,
-                iod=int(iod) % _IOD_MODULUS,
-                prc_m=prc,
-                rrc_mps=rrc,
-                sigma_pr_gnd_m=sigma,
-                b_values_m=tuple(b),
-            ),
-            correction_30=correction_30,
+            corrections={kind: entries[place] for kind, entries in corrections.items()},
             ephemeris_crc=int(crc),
-            ephemeris_decorrelation=p,
-            ephemeris_decorrelation_d=p_d,
+            decorrelation={kind: values[place] for kind, values in decorrelation.items()},
         )
-        for number, iod, crc, prc, rrc, sigma, p, p_d, b, correction_30 in zip(
-            RANGING_SOURCE_ID[chosen].tolist(), *columns, b_values, thirty, strict=True
-        )
+        for place, crc in enumerate(integrity.ephemeris_crc[chosen].tolist())
     )
 
 
-def _corrections_30(integrity: IntegrityEpoch, chosen: list[int]) -> list[Correction30]:
-    names = ("prc_30_m", "rrc_30_mps", "sigma_pr_gnd_d_m", "sigma_pr_gnd_30_m")
-    columns = [getattr(integrity, name)[chosen].tolist() for name in names]
+def _entries_1(integrity: IntegrityEpoch, product: int, chosen: list[int]) -> list[Correction100]:
+    """Measurement blocks of a type 1 message."""
+    of_product = (integrity.prc_m, integrity.rrc_mps, integrity.sigma_pr_gnd_m)
+    columns = [values[product, chosen].tolist() for values in of_product]
+    b_values, iods = integrity.b_m[product][:, chosen].T.tolist(), integrity.iod[chosen].tolist()
+    return [
+        Correction100(
+            ranging_source_id=number,
+            iod=int(iod) % _IOD_MODULUS,
+            prc_m=prc,
+            rrc_mps=rrc,
+            sigma_pr_gnd_m=sigma,
+            b_values_m=tuple(b),
+        )
+        for number, iod, prc, rrc, sigma, b in zip(
+            RANGING_SOURCE_ID[chosen].tolist(), iods, *columns, b_values, strict=True
+        )
+    ]
+
+
+def _entries_11(integrity: IntegrityEpoch, product: int, chosen: list[int]) -> list[Correction30]:
+    """Measurement blocks of a type 11 message; the first sigma belongs to the type 1 correction."""
+    of_product = (integrity.prc_m[product], integrity.rrc_mps[product], integrity.sigma_pr_gnd_m[product])
+    columns = [values[chosen].tolist() for values in (*of_product, integrity.sigma_pr_gnd_d_m)]
     return [
         Correction30(
-            ranging_source_id=number, prc_30_m=prc, rrc_30_mps=rrc, sigma_pr_gnd_d_m=sigma_d, sigma_pr_gnd_30_m=sigma_30
+            ranging_source_id=number, prc_30_m=prc, rrc_30_mps=rrc, sigma_pr_gnd_30_m=sigma, sigma_pr_gnd_d_m=sigma_d
         )
-        for number, prc, rrc, sigma_d, sigma_30 in zip(RANGING_SOURCE_ID[chosen].tolist(), *columns, strict=True)
+        for number, prc, rrc, sigma, sigma_d in zip(RANGING_SOURCE_ID[chosen].tolist(), *columns, strict=True)
     ]
+
+
+_ENTRIES: Final[dict[int, Callable[[IntegrityEpoch, int, list[int]], Sequence[Correction100 | Correction30]]]] = {
+    1: _entries_1,
+    11: _entries_11,
+}
+"""What each type of message takes of a product."""

@@ -17,11 +17,12 @@ from gbas_ground.corrections import formation as form
 from gbas_ground.corrections.sigma import Sigmas, broadcast_sigmas
 from gbas_ground.exclusions import Latch, exclude, initial_latch
 from gbas_ground.monitors.correction_limits import check_correction
-from gbas_ground.monitors.monitor_table import MonitorSummary, summarise
+from gbas_ground.monitors.monitor_table import Summaries, summarise
 from gbas_ground.monitors.multiple_reference import channel_sigma_m, check_b_values, check_unused
 from gbas_ground.monitors.result import MonitorResult
 from gbas_ground.params import GroundParams
 from gbas_msgs_py.codes import ExclusionCause
+from gbas_msgs_py.monitors import B_VALUE, CORRECTION_LIMITS, MonitorTest
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -171,26 +172,24 @@ def b_value_check(corrections: Corrections, params: GroundParams) -> MonitorResu
     return check_b_values(corrections.b_m, corrections.channel_sigma_m, corrections.used, params.k_b)
 
 
-def limit_checks(corrections: Corrections, params: GroundParams) -> tuple[tuple[ExclusionCause, MonitorResult], ...]:
+def limit_checks(corrections: Corrections, params: GroundParams) -> tuple[tuple[MonitorTest, MonitorResult], ...]:
     """Sizes of PRC and, where there is one, RRC, ``(tau, N)`` each."""
     has = corrections.count > 0
     has_rate = has & np.isfinite(corrections.rrc_mps).all(axis=0)
     return (
-        (ExclusionCause.PRC_LIMIT, check_correction(corrections.prc_m, has, params.max_prc_m)),
-        (ExclusionCause.RRC_LIMIT, check_correction(corrections.rrc_mps, has_rate, params.max_rrc_mps)),
+        (CORRECTION_LIMITS.test("prc"), check_correction(corrections.prc_m, has, params.max_prc_m)),
+        (CORRECTION_LIMITS.test("rrc"), check_correction(corrections.rrc_mps, has_rate, params.max_rrc_mps)),
     )
 
 
-def consistency_summaries(corrections: Corrections, params: GroundParams) -> dict[str, MonitorSummary]:
+def consistency_summaries(corrections: Corrections, params: GroundParams) -> Summaries:
     """What the monitors of the corrections say of each satellite."""
     has = corrections.count > 0
     limits = {
-        cause.word.removesuffix("_limit"): summarise(result, has) for cause, result in limit_checks(corrections, params)
+        CORRECTION_LIMITS.key(test.name): summarise(result, has) for test, result in limit_checks(corrections, params)
     }
-    return {
-        "b_value": summarise(b_value_check(corrections, params), corrections.used & (corrections.count >= 2)),
-        **limits,
-    }
+    several = corrections.used & (corrections.count >= 2)
+    return {B_VALUE.key("b"): summarise(b_value_check(corrections, params), several), **limits}
 
 
 def resolve_consistency(
@@ -261,13 +260,13 @@ def _worst_b_value(corrections: Corrections, exclusions: Exclusions, params: Gro
 
 def _worst_limit(corrections: Corrections, exclusions: Exclusions, params: GroundParams) -> _Step | None:
     best: tuple[float, ExclusionCause, MonitorResult, tuple[int, ...]] | None = None
-    for cause, result in limit_checks(corrections, params):
+    for test, result in limit_checks(corrections, params):
         if not result.failed.any():
             continue
         ratio = np.where(exclusions.satellites.excluded, 0.0, _ratio(result))
         place = tuple(int(each) for each in np.unravel_index(int(ratio.argmax()), ratio.shape))
         if ratio[place] > (best[0] if best else 0.0):
-            best = (float(ratio[place]), cause, result, place)
+            best = (float(ratio[place]), test.cause, result, place)
     if best is None:
         return None
     _, cause, result, (tau, satellite) = best

@@ -15,7 +15,7 @@ from gbas_core.record import BoolArray
 from gbas_core.satellites import SAT_IDS
 from gbas_ground.consistency import Corrections, Exclusions, Finding
 from gbas_ground.exclusions import exclude
-from gbas_ground.monitors.monitor_table import MonitorSummary, summarise, worst_of
+from gbas_ground.monitors.monitor_table import Summaries, summarise, worst_of
 from gbas_ground.monitors.result import MonitorResult
 from gbas_ground.monitors.sigma_monitor import (
     SigmaMonitorParams,
@@ -27,6 +27,7 @@ from gbas_ground.monitors.sigma_monitor import (
 )
 from gbas_ground.params import GroundParams
 from gbas_msgs_py.codes import ExclusionCause
+from gbas_msgs_py.monitors import SIGMA_MONITOR
 
 
 @lru_cache(maxsize=8)
@@ -41,7 +42,7 @@ def initial_long_term(params: GroundParams) -> SigmaMonitorState:
 
 def monitor_sigmas(
     state: SigmaMonitorState, corrections: Corrections, exclusions: Exclusions, dt_s: float, params: GroundParams
-) -> tuple[SigmaMonitorState, Exclusions, tuple[Finding, ...], dict[str, MonitorSummary]]:
+) -> tuple[SigmaMonitorState, Exclusions, tuple[Finding, ...], Summaries]:
     """Take the B values of one epoch.
 
     Returns
@@ -50,7 +51,7 @@ def monitor_sigmas(
     exclusions : Exclusions
         With the channels and receivers that fail, from the next epoch on.
     findings : tuple of Finding
-    summaries : dict
+    summaries : mapping from the numbers of a test to MonitorSummary
     """
     settings, used = _settings(params), corrections.used & (corrections.count >= 2)
     # What is excluded, alone or with its receiver, has no B values; its old estimates count until they are forgotten.
@@ -58,7 +59,10 @@ def monitor_sigmas(
     due = used | (~exclusions.usable_channels() & remembered)
     normalised = normalised_b(corrections.b_m, corrections.channel_sigma_m, used)
     state, result = sigma_monitor_step(state, normalised, due, dt_s, settings)
-    summaries = {"sigma_mean": summarise(result.mean, used), "sigma_spread": summarise(result.variance, used)}
+    summaries = {
+        SIGMA_MONITOR.key("mean"): summarise(result.mean, used),
+        SIGMA_MONITOR.key("spread"): summarise(result.variance, used),
+    }
     if not params.monitors.sigma.exclude:
         return state, exclusions, (), summaries
     exclusions, findings = _excluded(exclusions, result)

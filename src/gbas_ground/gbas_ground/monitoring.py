@@ -50,7 +50,7 @@ from gbas_ground.monitors.ionosphere_gradient import (
     check_ionosphere_gradient,
     gradient_site,
 )
-from gbas_ground.monitors.monitor_table import MonitorSummary, place_of_worst, summarise, worst_of
+from gbas_ground.monitors.monitor_table import Summaries, place_of_worst, signal_of, summarise, worst_of
 from gbas_ground.monitors.power_expectation import (
     PowerExpectationParams,
     PowerExpectationState,
@@ -68,15 +68,20 @@ from gbas_ground.monitors.two_frequency_divergence import (
     two_frequency_step,
 )
 from gbas_ground.params import GroundParams
-from gbas_msgs_py.codes import ExclusionCause
+from gbas_msgs_py.codes import ExclusionCause, Signal
+from gbas_msgs_py.monitors import (
+    CARRIER_ACCELERATION,
+    CCD,
+    CCD_F,
+    COMMON_SLIP,
+    EPHEMERIS_RESIDUAL,
+    EXPECTED_POWER,
+    IONOSPHERE_GRADIENT,
+)
 from gbas_msgs_py.records import BASELINES, MAX_REFERENCE_RECEIVERS
 
-_CARRIER_CAUSES: Final = (
-    ("carrier_step", ExclusionCause.CARRIER_STEP),
-    ("carrier_rate", ExclusionCause.CARRIER_RATE),
-    ("acceleration", ExclusionCause.CARRIER_ACCELERATION),
-)
-"""Names and causes in the order of the acceleration monitor's statistics."""
+_CARRIER_TESTS: Final = tuple(CARRIER_ACCELERATION.test(name) for name in ("step", "rate", "acceleration"))
+"""In the order of the monitor's statistics."""
 _GRADUAL: Final = frozenset(
     {
         ExclusionCause.CODE_CARRIER_DIVERGENCE,
@@ -157,15 +162,15 @@ class _MonitorOutput(NamedTuple):
 
     Attributes
     ----------
-    summaries : mapping from a monitor's name to MonitorSummary
-    details : mapping from a field of :class:`MonitorEpoch` to its value
+    summaries : mapping from the numbers of a test to MonitorSummary
+    details : mapping from a field of :class:`MonitorDetailEpoch` to its value
     satellites, channels : tuple of Verdict
         What follows from it; nothing from a monitor that is only watched.
     ready : (N,) bool array or None
         Satellites it could judge, where that is required.
     """
 
-    summaries: Mapping[str, MonitorSummary]
+    summaries: Summaries
     details: Mapping[str, Any] = {}
     satellites: tuple[Verdict, ...] = ()
     channels: tuple[Verdict, ...] = ()
@@ -188,8 +193,8 @@ class MonitoringResult:
         Satellites that every required monitor could judge.
     orbit_bound : (N,) array
         P that the ephemeris monitor supports, :func:`~gbas_ground.claims.orbit_claim.orbit_bound` [m/m].
-    summaries : mapping from a monitor's name to MonitorSummary
-    details : mapping from a field of :class:`MonitorEpoch` to its value
+    summaries : mapping from the numbers of a test to MonitorSummary
+    details : mapping from a field of :class:`MonitorDetailEpoch` to its value
     """
 
     satellites: tuple[Verdict, ...]
@@ -198,7 +203,7 @@ class MonitoringResult:
     receivers_quiet: FloatArray
     ready: BoolArray
     orbit_bound: FloatArray
-    summaries: Mapping[str, MonitorSummary]
+    summaries: Summaries
     details: Mapping[str, Any]
 
     def passed(self, share: float) -> BoolArray:
@@ -301,7 +306,7 @@ def run_monitors(
         receivers_quiet=_quiet_receivers(residual_m, steady, inputs, settings, params),
         ready=ready,
         orbit_bound=bound,
-        summaries={name: each for part in parts for name, each in part.summaries.items()},
+        summaries={key: each for part in parts for key, each in part.summaries.items()},
         details={name: each for part in parts for name, each in part.details.items()},
     )
     state = MonitoringState(ccd=ccd, ccd_f=ccd_f, acceleration=acceleration, ephemeris=ephemeris, power=power)
@@ -313,7 +318,7 @@ def _common_slip(inputs: MonitorInputs) -> _MonitorOutput:
     tracked = np.isfinite(inputs.code_m[:, L1] + inputs.carrier_m[:, L1])
     result = check_common_slip(inputs.slipped[:, L1], tracked, inputs.in_use)
     return _MonitorOutput(
-        summaries={"common_slip": summarise(result, inputs.in_use)},
+        summaries={COMMON_SLIP.key("slips"): summarise(result, inputs.in_use)},
         satellites=(Verdict(ExclusionCause.COMMON_SLIP, result),),
     )
 
@@ -328,7 +333,7 @@ def _ccd(
     by_receiver = missing(MAX_REFERENCE_RECEIVERS)
     by_receiver[: len(epoch.receiver_mps)] = epoch.receiver_mps[:, L1]
     return state, _MonitorOutput(
-        summaries={"ccd": summarise(result, inputs.due)},
+        summaries={CCD.key("rate"): summarise(result, inputs.due)},
         details={"ccd_receiver_mps": by_receiver},
         satellites=_verdicts(exclude, (ExclusionCause.CODE_CARRIER_DIVERGENCE, result), inputs.due),
         ready=epoch.receivers[L1] > 0 if exclude else None,
@@ -354,9 +359,12 @@ def _ccd_f(
     state, epoch = two_frequency_step(state, given, inputs.dt_s, params)
     forms = {"sound": epoch.sound, "paper": epoch.paper}
     due = inputs.due & (epoch.receivers > 0)
-    chosen = forms.get(exclude)
+    chosen, signal = forms.get(exclude), Signal.L1_L5 if params.other == L5 else Signal.L1_L2
     return state, _MonitorOutput(
-        summaries={"ccd_f": summarise(epoch.sound, due), "ccd_f_paper": summarise(epoch.paper, due)},
+        summaries={
+            CCD_F.key("full_rank"): summarise(epoch.sound, due, signal),
+            CCD_F.key("published"): summarise(epoch.paper, due, signal),
+        },
         details={"divergence_mps": epoch.mean_mps, **_likeliest_mode(epoch, due, params)},
         satellites=() if chosen is None else _verdicts(True, (ExclusionCause.TWO_FREQUENCY_DIVERGENCE, chosen), due),
     )
@@ -395,8 +403,11 @@ def _acceleration(
         shift_m=inputs.shift_m,
     )
     known = np.isfinite(found.satellites.statistic[0, 0])
-    each = [_row(found.satellites, number) for number in range(len(_CARRIER_CAUSES))]
-    summaries = {name: summarise(result, inputs.due) for (name, _), result in zip(_CARRIER_CAUSES, each, strict=True)}
+    signal = signal_of(params.bands)
+    summaries = {
+        CARRIER_ACCELERATION.key(test.name): summarise(_row(found.satellites, number), inputs.due, signal)
+        for number, test in enumerate(_CARRIER_TESTS)
+    }
     return state, _MonitorOutput(
         summaries=summaries,
         satellites=_carrier_verdicts(found, inputs.due & known) if exclude else (),
@@ -413,8 +424,8 @@ def _carrier_verdicts(found: CarrierAccelerationResult, due: BoolArray) -> tuple
     worst = worst_of(found.satellites, axes=2)
     number, _ = place_of_worst(found.satellites, axes=2)
     return tuple(
-        Verdict(cause, replace(worst, failed=failed & (number == place)))
-        for place, (_, cause) in enumerate(_CARRIER_CAUSES)
+        Verdict(test.cause, replace(worst, failed=failed & (number == place)))
+        for place, test in enumerate(_CARRIER_TESTS)
     )
 
 
@@ -504,7 +515,7 @@ def _gradient(
     found = check_ionosphere_gradient(differences, inputs.due, site, params)
     due = inputs.due & (len(site.baselines) > 0)
     return _MonitorOutput(
-        summaries={"gradient": summarise(found.verdict, due)},
+        summaries={IONOSPHERE_GRADIENT.key("gradient"): summarise(found.verdict, due, signal_of(params.bands))},
         details=_gradient_details(found, differences, settings),
         satellites=_verdicts(exclude, (ExclusionCause.IONOSPHERE_GRADIENT, found.verdict), due),
         ready=found.monitored if settings.gradient_required else None,
@@ -528,7 +539,11 @@ def _ephemeris(
     if not exclude:
         bound = np.full(bound.shape, np.inf)
     part = _MonitorOutput(
-        summaries={"ephemeris": summarise(result, inputs.due & (len(baselines) > 0))},
+        summaries={
+            EPHEMERIS_RESIDUAL.key("residual"): summarise(
+                result, inputs.due & (len(baselines) > 0), signal_of(settings.gradient.bands)
+            )
+        },
         satellites=_verdicts(exclude, (ExclusionCause.EPHEMERIS_RESIDUAL, result), inputs.due),
         ready=bound <= MAX_DECORRELATION if settings.orbit_required else None,
     )
@@ -550,7 +565,7 @@ def _power(
     if exclude and found.channels.failed.any():
         channels = (Verdict(ExclusionCause.EXPECTED_POWER, worst_of(_moved(found.channels, 1, 0), axes=1)),)
     return state, _MonitorOutput(
-        summaries={"expected_power": summarise(satellites, np.logical_or.reduce(due))},
+        summaries={EXPECTED_POWER.key("satellite"): summarise(satellites, np.logical_or.reduce(due))},
         satellites=_verdicts(exclude, (ExclusionCause.EXPECTED_POWER, satellites), inputs.due),
         channels=channels,
     )

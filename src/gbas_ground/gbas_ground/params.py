@@ -386,7 +386,7 @@ class GroundParams(Declared):
         return ScheduleParams(
             station_id=self.station_id,
             slots=tuple(SLOT_NAMES.index(slot) for slot in self.slots),
-            gast_d=self.gast_d,
+            message_types=(1, 11) if self.gast_d else (1,),
             test=self.test,
             period_frames=self.period_frames,
             occupancy_min=self.occupancy_min,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Final, NamedTuple
@@ -55,18 +55,21 @@ from gbas_ground.ionosphere.protection import (
 from gbas_ground.long_term import initial_long_term, monitor_sigmas
 from gbas_ground.monitoring import MonitoringResult, MonitoringState, MonitorInputs, initial_monitoring, run_monitors
 from gbas_ground.monitors.expected_range import check_expected_range
-from gbas_ground.monitors.monitor_table import MonitorSummary, monitor_epoch, summarise
+from gbas_ground.monitors.monitor_table import Summaries, monitor_detail_epoch, monitor_epoch, summarise
 from gbas_ground.monitors.result import MonitorResult
 from gbas_ground.monitors.sigma_monitor import SigmaMonitorState
 from gbas_ground.monitors.signal_power import check_signal_power
 from gbas_ground.params import GroundParams
 from gbas_msgs_py.codes import ChannelState, EventKind, ExclusionCause
 from gbas_msgs_py.events import Event, EventLog
-from gbas_msgs_py.records import ChannelEpoch, IntegrityEpoch, MonitorEpoch
+from gbas_msgs_py.monitors import EXPECTED_RANGE, SIGNAL_POWER, TESTS
+from gbas_msgs_py.records import ChannelEpoch, IntegrityEpoch, MonitorDetailEpoch, MonitorEpoch
 from gbas_vdb.transmission.burst import Burst
 
 SOURCE: Final = "ground_station"
 _Checks = Sequence[tuple[ExclusionCause, MonitorResult]]
+_CHECKS: Final = (EXPECTED_RANGE.key("residual"), SIGNAL_POWER.key("cn0"))
+"""Tests of single channels, in their order."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -98,7 +101,9 @@ class Monitored:
     integrity : IntegrityEpoch
         Corrections, and what may be broadcast of them.
     statistics : MonitorEpoch
-        What every monitor measured.
+        What every monitor said.
+    details : MonitorDetailEpoch
+        What is behind it.
     channels : ChannelEpoch
         State and cause of every receiver's channel of every satellite.
     events : tuple of Event
@@ -106,6 +111,7 @@ class Monitored:
 
     integrity: IntegrityEpoch
     statistics: MonitorEpoch
+    details: MonitorDetailEpoch
     channels: ChannelEpoch
     events: tuple[Event, ...]
 
@@ -272,10 +278,14 @@ def _monitor(state: IntegrityState, epoch: GroundEpoch, params: GroundParams) ->
     events = EventLog(epoch.gps_week, epoch.tow_s, SOURCE)
     admitted, arrival = _admit(state, epoch, params, events)
     if arrival is Arrival.REFUSED:
-        nothing = ChannelEpoch(gps_week=epoch.gps_week, tow_s=epoch.tow_s)
-        integrity = empty_integrity(epoch.gps_week, epoch.tow_s)
-        statistics = MonitorEpoch(gps_week=epoch.gps_week, tow_s=epoch.tow_s)
-        return admitted, Monitored(integrity=integrity, statistics=statistics, channels=nothing, events=events.all())
+        week, tow_s = epoch.gps_week, epoch.tow_s
+        return admitted, Monitored(
+            integrity=empty_integrity(week, tow_s),
+            statistics=MonitorEpoch(gps_week=week, tow_s=tow_s),
+            details=MonitorDetailEpoch(gps_week=week, tow_s=tow_s),
+            channels=ChannelEpoch(gps_week=week, tow_s=tow_s),
+            events=events.all(),
+        )
     return _process(admitted, epoch, params, events)
 
 
@@ -338,8 +348,14 @@ def _process(
         long_term=judged.long_term,
         ionosphere=ionosphere,
     )
-    statistics = monitor_epoch(*time, judged.summaries, judged.monitor_output.details, np.isfinite(integrity.state))
-    return new, Monitored(integrity=integrity, statistics=statistics, channels=channels, events=events.all())
+    shown = np.isfinite(integrity.state)
+    return new, Monitored(
+        integrity=integrity,
+        statistics=monitor_epoch(*time, judged.summaries, shown),
+        details=monitor_detail_epoch(*time, judged.monitor_output.details, shown),
+        channels=channels,
+        events=events.all(),
+    )
 
 
 class _Judged(NamedTuple):
@@ -356,7 +372,7 @@ class _Judged(NamedTuple):
     exclusions : Exclusions
         With this epoch's.
     long_term : SigmaMonitorState
-    summaries : mapping from a monitor's name to MonitorSummary
+    summaries : mapping from the numbers of a test to MonitorSummary
     findings : tuple of Finding
         Satellites, channels and receivers that were excluded, and why.
     """
@@ -367,7 +383,7 @@ class _Judged(NamedTuple):
     corrections: Corrections
     exclusions: Exclusions
     long_term: SigmaMonitorState
-    summaries: Mapping[str, MonitorSummary]
+    summaries: Summaries
     findings: tuple[Finding, ...]
 
 
@@ -393,7 +409,7 @@ def _judge(
     long_term, exclusions, of_sigmas, sigma_summaries = monitor_sigmas(
         state.long_term, corrections, exclusions, dt_s, params
     )
-    checks = zip(("range", "power"), observed.checks, strict=True)
+    checks = zip(_CHECKS, observed.checks, strict=True)
     return _Judged(
         monitoring=monitoring,
         monitor_output=monitor_output,
@@ -402,7 +418,7 @@ def _judge(
         exclusions=_advanced(exclusions, inputs, corrections, observed.channel_ok, monitor_output, dt_s, params),
         long_term=long_term,
         summaries={
-            **{name: summarise(result, observed.tracked) for name, (_, result) in checks},
+            **{key: summarise(result, observed.tracked) for key, (_, result) in checks},
             **monitor_output.summaries,
             **consistency_summaries(corrections, params),
             **sigma_summaries,
@@ -641,7 +657,7 @@ def _channel_checks(raw: RawEpoch, predicted: PredictedRanges, tracked: BoolArra
     comparable = tracked & np.isfinite(predicted.clock_s)
     residual = check_expected_range(raw_correction, comparable, params.max_range_residual_m)
     power = check_signal_power(raw.cn0_dbhz[:, L1], tracked, params.min_cn0_dbhz, required=params.require_cn0)
-    return ((ExclusionCause.RANGE_RESIDUAL, residual), (ExclusionCause.SIGNAL_POWER, power))
+    return tuple((TESTS[key][1].cause, result) for key, result in zip(_CHECKS, (residual, power), strict=True))
 
 
 def _exclude_channels(exclusions: Exclusions, checks: _Checks, events: EventLog) -> Exclusions:

@@ -203,17 +203,3 @@ def enumerations() -> dict[str, list[dict[str, Any]]]:
         ]
         for kind in ENUMERATIONS
     }
-
-
-SATELLITE_MONITORS: Final[dict[str, tuple[str, ...]]] = {
-    ExclusionCause.CODE_CARRIER_DIVERGENCE.word: ("ccd",),
-    ExclusionCause.TWO_FREQUENCY_DIVERGENCE.word: ("ccd_f", "ccd_f_paper"),
-    ExclusionCause.IONOSPHERE_GRADIENT.word: ("gradient",),
-    ExclusionCause.CARRIER_ACCELERATION.word: ("acceleration",),
-    ExclusionCause.CARRIER_RATE.word: ("carrier_rate",),
-    ExclusionCause.CARRIER_STEP.word: ("carrier_step",),
-    ExclusionCause.COMMON_SLIP.word: ("common_slip",),
-    ExclusionCause.EPHEMERIS_RESIDUAL.word: ("ephemeris",),
-    ExclusionCause.EXPECTED_POWER.word: ("expected_power",),
-}
-"""Monitors that exclude a satellite, by the word of the cause: their statistic stands in the monitors table."""

@@ -5,41 +5,42 @@ Satellite states and service types are small integers carried as floats (a table
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
-from gbas_core.record import FloatArray, Record, per_satellite, scalar
+import numpy as np
+
+from gbas_core.record import FloatArray, Record, columns_of, per_row, per_satellite, scalar
+from gbas_core.satellites import N_SATS, RANGING_SOURCE_ID, SAT_IDS, SAT_INDEX, SOURCE_ID_INDEX
+from gbas_msgs_py.codes import MonitorState, Signal
+from gbas_msgs_py.monitors import MONITORS, TESTS, monitor_named
+from gbas_msgs_py.products import PRODUCTS
 
 MAX_REFERENCE_RECEIVERS = 4
 _RECEIVERS = range(1, MAX_REFERENCE_RECEIVERS + 1)
 BASELINES = tuple((i, j) for i in _RECEIVERS for j in _RECEIVERS if i < j)
 """Pairs of reference receivers, in the order in which tables have them."""
-GROUND_MONITORS = (
-    "range",
-    "power",
-    "expected_power",
-    "ccd",
-    "ccd_f",
-    "ccd_f_paper",
-    "gradient",
-    "acceleration",
-    "carrier_rate",
-    "carrier_step",
-    "common_slip",
-    "ephemeris",
-    "b_value",
-    "prc",
-    "rrc",
-    "sigma_mean",
-    "sigma_spread",
-)
-"""Monitors of the ground station, in the order in which tables have them."""
+
+
+def by_product(columns: str, unit: str, doc: str) -> Any:
+    """Declare a field ``(product, satellite)``; `columns` is the pattern of the columns' names."""
+    names = tuple(columns.format(product=product.name) for product in PRODUCTS)
+    return per_satellite(unit, doc, columns=names)
+
+
+def by_receiver(columns: str, unit: str, doc: str) -> Any:
+    """Declare a field ``(product, reference receiver, satellite)``; `columns` is the pattern of the columns' names."""
+    names = tuple(columns.format(product=product.name, receiver=j) for product in PRODUCTS for j in _RECEIVERS)
+    return per_satellite(unit, doc, columns=names, leading=(len(PRODUCTS), MAX_REFERENCE_RECEIVERS))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class IntegrityEpoch(Record):
     """Ground corrections of one epoch after monitoring: what may be broadcast, and why the rest may not.
 
-    Corrections are NaN unless `state` is USABLE.
+    Corrections are NaN unless `state` is USABLE. Fields of corrections have the products of
+    :data:`~gbas_msgs_py.products.PRODUCTS` as their first axis; those that a station does not make are NaN.
     """
 
     n_receivers: float = scalar("-", "reference receivers in use")
@@ -47,22 +48,18 @@ class IntegrityEpoch(Record):
     state: FloatArray = per_satellite("-", "ChannelState")
     cause: FloatArray = per_satellite("-", "ExclusionCause, 0 when none")
     elevation_rad: FloatArray = per_satellite("rad", "elevation at the reference point")
-    p_ephemeris: FloatArray = per_satellite("m/m", "ephemeris decorrelation parameter of the 100 s correction")
-    p_ephemeris_d: FloatArray = per_satellite("m/m", "the same of the 30 s correction")
+    p_ephemeris: FloatArray = by_product("p_ephemeris_{product}", "m/m", "ephemeris decorrelation parameter")
     iod: FloatArray = per_satellite("-", "issue of data of the ephemeris used")
     ephemeris_crc: FloatArray = per_satellite("-", "16-bit ephemeris CRC")
-    prc_100_m: FloatArray = per_satellite("m", "pseudorange correction, 100 s smoothing")
-    rrc_100_mps: FloatArray = per_satellite("m/s", "range rate correction, 100 s smoothing")
-    prc_30_m: FloatArray = per_satellite("m", "pseudorange correction, 30 s smoothing")
-    rrc_30_mps: FloatArray = per_satellite("m/s", "range rate correction, 30 s smoothing")
-    sigma_pr_gnd_m: FloatArray = per_satellite("m", "broadcast sigma of the 100 s correction")
-    sigma_pr_gnd_d_m: FloatArray = per_satellite("m", "sigma of the 100 s correction without ionospheric inflation")
-    sigma_pr_gnd_30_m: FloatArray = per_satellite("m", "sigma of the 30 s correction")
-    b_m: FloatArray = per_satellite(
-        "m", "B value of a reference receiver, NaN where it was not used", columns=tuple(f"b{j}_m" for j in _RECEIVERS)
+    prc_m: FloatArray = by_product("prc_{product}_m", "m", "pseudorange correction")
+    rrc_mps: FloatArray = by_product("rrc_{product}_mps", "m/s", "range rate correction")
+    sigma_pr_gnd_m: FloatArray = by_product("sigma_pr_gnd_{product}_m", "m", "broadcast sigma of the correction")
+    sigma_pr_gnd_d_m: FloatArray = per_satellite("m", "sigma of the L1 100 s correction without ionospheric inflation")
+    b_m: FloatArray = by_receiver(
+        "b{receiver}_{product}_m", "m", "B value of a reference receiver, NaN where it was not used"
     )
-    receiver_used: FloatArray = per_satellite(
-        "-", "1 where the receiver's channel was used", columns=tuple(f"rr{j}_used" for j in _RECEIVERS)
+    receiver_used: FloatArray = by_receiver(
+        "rr{receiver}_{product}_used", "-", "1 where the receiver's channel was used"
     )
 
 
@@ -83,21 +80,96 @@ class ChannelEpoch(Record):
     )
 
 
+class MonitorRow(NamedTuple):
+    """One row of the monitors table in words."""
+
+    monitor: str
+    test: str
+    sat: str
+    signal: Signal
+    statistic: float
+    threshold: float
+    state: MonitorState
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MonitorEpoch(Record):
-    """What every ground monitor measured at one epoch: statistic, threshold and state by satellite, and what is behind.
+    """What the ground monitors said at one epoch: a row for each test, satellite and signal that was due.
 
-    Where a monitor tests several values of a satellite (receivers, baselines, smoothing constants), its statistic is
-    the one that is worst against its threshold. Statistics and thresholds have the unit of the monitor's documentation.
+    Where a test has several values of a satellite (receivers, baselines, smoothing constants, bands), its row is the
+    one that is worst against its threshold.
     """
 
-    statistic: FloatArray = per_satellite(
-        "*", "statistic", columns=tuple(f"{name}_statistic" for name in GROUND_MONITORS)
+    monitor: FloatArray = per_row(
+        "-", "number of the monitor", key=True, codes=(monitor.number for monitor in MONITORS)
     )
-    threshold: FloatArray = per_satellite(
-        "*", "threshold of the statistic", columns=tuple(f"{name}_threshold" for name in GROUND_MONITORS)
+    test: FloatArray = per_row("-", "number of its test", key=True, codes=(number for _, number in TESTS))
+    sat: FloatArray = per_row("-", "ranging source identifier", key=True, codes=RANGING_SOURCE_ID.tolist())
+    signal: FloatArray = per_row("-", "Signal; 0 when it is of no single one", key=True, codes=Signal)
+    statistic: FloatArray = per_row("*", "statistic, in the unit of the test; NaN when there was none")
+    threshold: FloatArray = per_row("*", "threshold of the statistic")
+    state: FloatArray = per_row(
+        "-", "MonitorState", codes=(state for state in MonitorState if state is not MonitorState.NOT_DUE)
     )
-    state: FloatArray = per_satellite("-", "MonitorState", columns=tuple(f"{name}_state" for name in GROUND_MONITORS))
+
+    def check(self) -> None:
+        """Refuse a test that its monitor does not have."""
+        for monitor, test in set(zip(self.monitor.tolist(), self.test.tolist(), strict=True)):
+            if (monitor, test) not in TESTS:
+                raise ValueError(f"monitor {monitor:g} has no test {test:g}")
+
+    def __len__(self) -> int:
+        return len(self.monitor)
+
+    def select(self, *, monitor: str = "", test: str = "", sat: str = "") -> MonitorEpoch:
+        """The rows of a monitor, of one of its tests, of a satellite (``"G05"``), or of all that are given.
+
+        Raises
+        ------
+        KeyError
+            When there is no such monitor, test or satellite.
+        """
+        rows = np.ones(len(self), dtype=bool)
+        if monitor:
+            entry = monitor_named(monitor)
+            rows &= self.monitor == entry.number
+            if test:
+                rows &= self.test == entry.test(test).number
+        elif test:
+            raise KeyError(f"test {test!r} of which monitor?")
+        if sat:
+            rows &= self.sat == RANGING_SOURCE_ID[SAT_INDEX[sat]]
+        return replace(self, **{item.name: getattr(self, item.name)[rows] for item, _ in columns_of(MonitorEpoch)})
+
+    def states(self, monitor: str, test: str = "") -> FloatArray:
+        """MonitorState by satellite, ``(N,)``: NOT_DUE without a row, the largest number of several rows."""
+        chosen, states = self.select(monitor=monitor, test=test), np.full(N_SATS, float(MonitorState.NOT_DUE))
+        index = [SOURCE_ID_INDEX[int(sat)] for sat in chosen.sat.tolist()]
+        np.maximum.at(states, index, chosen.state)
+        return states
+
+    def rows(self) -> Iterator[MonitorRow]:
+        """The rows in words."""
+        columns = (self.monitor, self.test, self.sat, self.signal, self.statistic, self.threshold, self.state)
+        for number, test_number, sat, signal, statistic, threshold, state in zip(
+            *(column.tolist() for column in columns), strict=True
+        ):
+            monitor, test = TESTS[number, test_number]
+            yield MonitorRow(
+                monitor.name,
+                test.name,
+                SAT_IDS[int(SOURCE_ID_INDEX[int(sat)])],
+                Signal(int(signal)),
+                statistic,
+                threshold,
+                MonitorState(int(state)),
+            )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MonitorDetailEpoch(Record):
+    """What is behind the ground monitors' statistics: the vectors by receiver, combination and baseline."""
+
     ccd_receiver_mps: FloatArray = per_satellite(
         "m/s", "divergence rate of one receiver, L1", columns=tuple(f"rr{j}_ccd_mps" for j in _RECEIVERS)
     )
@@ -126,7 +198,7 @@ class SolutionEpoch(Record):
     the final course; without a FAS it is to the left of north (west).
     """
 
-    mode: float = 1.0
+    mode: float = scalar("-", "number of the processing mode, of MODES")
     x_m: float = scalar("m", "ECEF position")
     y_m: float = scalar("m", "ECEF position")
     z_m: float = scalar("m", "ECEF position")
@@ -167,7 +239,7 @@ class SolutionEpoch(Record):
 class ProtectionEpoch(Record):
     """Protection levels, alert limits and the service of one airborne epoch."""
 
-    mode: float = 1.0
+    mode: float = scalar("-", "number of the processing mode of the solution, of MODES")
     service: float = scalar("-", "ServiceType in use")
     alert: float = scalar("-", "1 when navigation must not be trusted, 0 when it may")
     vpl_m: float = scalar("m", "vertical protection level")

@@ -1,9 +1,9 @@
 """Records as tables of doubles, described by a label that travels with them.
 
-A table has one row a satellite. Its columns are the epoch (``gps_week``, ``tow_s``), the record's scalars (repeated on
-every row), and for records with a satellite axis ``sat`` (the ranging source identifier) and the per-satellite columns.
-An epoch without any satellite is one marker row whose ``sat`` and per-satellite values are NaN. The label names schema,
-version and columns::
+A table has one row a satellite, or one for whatever the record says of its rows. Its columns are the epoch
+(``gps_week``, ``tow_s``), the record's scalars (repeated on every row), and for records with a satellite axis ``sat``
+(the ranging source identifier) and the per-satellite columns, for records of rows their columns. An epoch without any
+row is one marker row in which all but the epoch and the scalars is NaN. The label names schema, version and columns::
 
     gbas/observations/1: gps_week,tow_s,simulated,sat,code_l1_m,...
 
@@ -18,7 +18,7 @@ from typing import Any, Final, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gbas_core.record import FloatArray, Record, columns_of
+from gbas_core.record import ColumnSpec, FloatArray, Record, columns_of
 from gbas_core.satellites import N_SATS, RANGING_SOURCE_ID
 
 R = TypeVar("R", bound=Record)
@@ -45,6 +45,43 @@ class SchemaError(ValueError):
     """A table, label or record that does not follow its schema; the message says what was expected and found."""
 
 
+class RowLayout:
+    """The columns of a record of rows, and what every row must keep to."""
+
+    def __init__(self, identifier: str, specs: tuple[ColumnSpec, ...]) -> None:
+        self._identifier = identifier
+        self.names = tuple(spec.names[0] for spec in specs)
+        self._codes = [(place, spec.codes) for place, spec in enumerate(specs) if spec.codes is not None]
+        self._known = [np.isin(np.arange(max(codes) + 1), codes) for _, codes in self._codes]
+        self._key = [place for place, spec in enumerate(specs) if spec.key]
+
+    def block(self, record: Record) -> FloatArray:
+        """The rows of a record, ``(rows, columns)``."""
+        columns = [getattr(record, name) for name in self.names]
+        if any(column.ndim != 1 or column.shape != columns[0].shape for column in columns):
+            shapes = ", ".join(f"{name} {column.shape}" for name, column in zip(self.names, columns, strict=True))
+            raise SchemaError(f"{self._identifier}: columns of rows have shapes {shapes}, expected one length")
+        return np.column_stack(columns)
+
+    def check(self, block: FloatArray) -> None:
+        """Refuse unknown codes and rows about the same."""
+        for (place, _), known in zip(self._codes, self._known, strict=True):
+            values = block[:, place]
+            inside = (values >= 0) & (values < len(known))
+            numbers = np.where(inside, values, 0.0).astype(np.int64)
+            bad = ~inside | (numbers != values) | ~known[numbers]
+            if bad.any():
+                raise SchemaError(f"{self._identifier}: {self.names[place]} {values[bad][0]:g} is not a known code")
+        keys = block[:, self._key]
+        if len(keys) > 1 and self._key:
+            ordered = keys[np.lexsort(keys.T)]
+            same = (ordered[1:] == ordered[:-1]).all(axis=1)
+            if same.any():
+                row = ordered[:-1][same][0]
+                what = ", ".join(f"{self.names[at]} {value:g}" for at, value in zip(self._key, row, strict=True))
+                raise SchemaError(f"{self._identifier}: more than one row with {what}")
+
+
 class TableSchema(Generic[R]):
     """How one record type travels as a table.
 
@@ -63,7 +100,9 @@ class TableSchema(Generic[R]):
         Schema, version and columns.
     columns : tuple of str
     has_satellites : bool
-        Whether the table has a ``sat`` column.
+        Whether the table has one row a satellite.
+    has_rows : bool
+        Whether it has rows of the record's own.
     """
 
     def __init__(self, name: str, version: int, record_type: type[R]) -> None:
@@ -72,13 +111,17 @@ class TableSchema(Generic[R]):
         self.record_type = record_type
         self.identifier = f"{LABEL_PREFIX}{name}/{version}"
         specs = columns_of(record_type)
-        self._scalars = tuple(item.name for item, spec in specs if not spec.satellite)
+        self._scalars = tuple(item.name for item, spec in specs if not (spec.satellite or spec.row))
+        self._rows = RowLayout(self.identifier, tuple(spec for _, spec in specs if spec.row))
+        self.has_rows = bool(self._rows.names)
         self._arrays, satellite_columns = _array_layout(specs)
         self.has_satellites = bool(self._arrays)
         self._n_head = len(_EPOCH_COLUMNS) + len(self._scalars)
         self._n_block = len(satellite_columns)
+        if self.has_rows and self.has_satellites:
+            raise SchemaError(f"{self.identifier}: has fields on the satellite axis and fields of rows")
         sat = (_SAT_COLUMN, *satellite_columns) if self.has_satellites else ()
-        self.columns: tuple[str, ...] = (*_EPOCH_COLUMNS, *self._scalars, *sat)
+        self.columns: tuple[str, ...] = (*_EPOCH_COLUMNS, *self._scalars, *sat, *self._rows.names)
         self.label = f"{self.identifier}: {','.join(self.columns)}"
         self._descriptions = _descriptions(specs, self.has_satellites)
         if len(set(self.columns)) != len(self.columns):
@@ -105,20 +148,43 @@ class TableSchema(Generic[R]):
         Returns
         -------
         (rows, len(columns)) float64 array, C-contiguous
-            Satellites with any value, in the order of the satellite axis; one marker row when there is none.
+            Satellites with any value, in the order of the satellite axis, or the record's rows in their order; one
+            marker row when there is none.
 
         Raises
         ------
         SchemaError
-            For another record type, an array of the wrong shape, an impossible epoch, or an infinite value.
+            For another record type, an array of the wrong shape, an impossible epoch, an infinite value, or rows with
+            unknown codes or the same key.
         """
         if type(record) is not self.record_type:
             raise SchemaError(f"{self.identifier}: encodes {self.record_type.__name__}, not {type(record).__name__}")
         _check_epoch(self.identifier, float(record.gps_week), float(record.tow_s))
         head = [record.gps_week, record.tow_s, *[getattr(record, name) for name in self._scalars]]
-        table = self._satellite_rows(record, head) if self.has_satellites else np.array([head], dtype=np.float64)
+        if self.has_satellites:
+            table = self._satellite_rows(record, head)
+        elif self.has_rows:
+            table = self._own_rows(record, head)
+        else:
+            table = np.array([head], dtype=np.float64)
         _check_finite_or_nan(self.identifier, self.columns, table)
+        self._check_record(record)
         return table
+
+    def _own_rows(self, record: R, head: list[float]) -> FloatArray:
+        block = self._rows.block(record)
+        table = np.empty((max(len(block), 1), len(self.columns)))
+        table[:, : self._n_head] = head
+        table[:, self._n_head :] = block if len(block) else np.nan
+        _check_finite_or_nan(self.identifier, self.columns, table)
+        self._rows.check(block)
+        return table
+
+    def _check_record(self, record: R) -> None:
+        try:
+            record.check()
+        except ValueError as error:
+            raise SchemaError(f"{self.identifier}: {error}") from None
 
     def _satellite_rows(self, record: R, head: list[float]) -> FloatArray:
         block = np.empty((self._n_block, N_SATS))
@@ -126,7 +192,7 @@ class TableSchema(Generic[R]):
             values = getattr(record, name)
             if values.shape != shape:
                 raise SchemaError(f"{self.identifier}: {name} has shape {values.shape}, expected {shape}")
-            block[rows] = values
+            block[rows] = values.reshape(-1, N_SATS)
         present = np.flatnonzero(~np.isnan(block).all(axis=0))
         table = np.empty((max(present.size, 1), len(self.columns)))
         table[:, : self._n_head] = head
@@ -150,7 +216,7 @@ class TableSchema(Generic[R]):
         ------
         SchemaError
             For another label, a wrong size, rows of different epochs or scalars, an epoch that is not finite or out of
-            range, an unknown or repeated satellite, an infinite value.
+            range, an unknown or repeated satellite, an infinite value, rows with unknown codes or the same key.
         """
         if label != self.label:
             raise SchemaError(self._label_difference(label))
@@ -165,13 +231,24 @@ class TableSchema(Generic[R]):
             block = self._checked_block(data)
             for name, rows, shape in self._arrays:
                 values[name] = block[rows].reshape(shape)
-        return self.record_type(gps_week=int(head[0]), tow_s=head[1], **values)
+        elif self.has_rows:
+            values |= self._checked_rows(data)
+        record = self.record_type(gps_week=int(head[0]), tow_s=head[1], **values)
+        self._check_record(record)
+        return record
+
+    def _checked_rows(self, data: FloatArray) -> dict[str, FloatArray]:
+        body = data[:, self._n_head :]
+        if len(body) == 1 and np.isnan(body).all():
+            body = body[:0]
+        self._rows.check(body)
+        return {name: body[:, place].copy() for place, name in enumerate(self._rows.names)}
 
     def _checked_head(self, data: FloatArray) -> list[float]:
         heads = data[:, : self._n_head]
         first = heads[0]
         if data.shape[0] > 1:
-            if not self.has_satellites:
+            if not (self.has_satellites or self.has_rows):
                 raise SchemaError(f"{self.identifier}: {data.shape[0]} rows, expected 1")
             same = (heads == first) | (np.isnan(heads) & np.isnan(first))
             if not same.all():
@@ -224,9 +301,8 @@ def _array_layout(
     columns: list[str] = []
     for item, spec in specs:
         if spec.satellite:
-            # A field declared without `columns` is named after itself and has no leading axis.
-            shape = (N_SATS,) if spec.names == (item.name,) else (len(spec.names), N_SATS)
-            layout.append((item.name, slice(len(columns), len(columns) + len(spec.names)), shape))
+            rows = slice(len(columns), len(columns) + len(spec.names))
+            layout.append((item.name, rows, (*spec.leading, N_SATS)))
             columns.extend(spec.names)
     return tuple(layout), columns
 
@@ -234,7 +310,8 @@ def _array_layout(
 def _descriptions(specs: tuple[tuple[Any, Any], ...], has_satellites: bool) -> list[tuple[str, str]]:
     """Unit and meaning of each column, in the order of the columns."""
     texts = [("week", "GPS week, not modulo 1024"), ("s", "time of week")]
-    texts += [(spec.unit, spec.doc) for _, spec in specs if not spec.satellite]
+    texts += [(spec.unit, spec.doc) for _, spec in specs if not (spec.satellite or spec.row)]
+    texts += [(spec.unit, spec.doc) for _, spec in specs if spec.row]
     if has_satellites:
         texts.append(("-", "ranging source identifier, NaN on the marker row of an epoch without satellites"))
         texts += [(spec.unit, spec.doc) for _, spec in specs if spec.satellite for _ in spec.names]

@@ -12,7 +12,18 @@ from numpy.typing import NDArray
 from gbas_core.gnss.ephemeris import Ephemeris
 from gbas_core.gnss.observations import ObservationEpoch
 from gbas_core.record import Record, scalar
-from gbas_msgs_py.records import ChannelEpoch, IntegrityEpoch, MonitorEpoch, ProtectionEpoch, SolutionEpoch
+from gbas_msgs_py.codes import enumerations
+from gbas_msgs_py.modes import mode_dictionary
+from gbas_msgs_py.monitors import monitor_dictionary
+from gbas_msgs_py.products import product_dictionary
+from gbas_msgs_py.records import (
+    ChannelEpoch,
+    IntegrityEpoch,
+    MonitorDetailEpoch,
+    MonitorEpoch,
+    ProtectionEpoch,
+    SolutionEpoch,
+)
 from gbas_msgs_py.schema import LABEL_PREFIX, SchemaError, TableSchema
 
 
@@ -23,7 +34,7 @@ class ProgressEpoch(Record):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TruthEpoch(Record):
-    """Where the antenna truly was; only a simulator knows, and no part of the ground or airborne side reads it."""
+    """Where the antenna truly was and how the aircraft lay; known to a simulator alone, read by neither end."""
 
     x_m: float = scalar("m", "ECEF position")
     y_m: float = scalar("m", "ECEF position")
@@ -31,21 +42,36 @@ class TruthEpoch(Record):
     vx_mps: float = scalar("m/s", "ECEF velocity")
     vy_mps: float = scalar("m/s", "ECEF velocity")
     vz_mps: float = scalar("m/s", "ECEF velocity")
+    roll_rad: float = scalar("rad", "roll, right wing down")
+    pitch_rad: float = scalar("rad", "pitch, nose up")
+    heading_rad: float = scalar("rad", "true heading, clockwise from north")
 
 
 OBSERVATIONS: Final = TableSchema("observations", 1, ObservationEpoch)
 EPHEMERIS: Final = TableSchema("ephemeris", 1, Ephemeris)
-INTEGRITY: Final = TableSchema("integrity", 2, IntegrityEpoch)
-MONITORS: Final = TableSchema("monitors", 1, MonitorEpoch)
+INTEGRITY: Final = TableSchema("integrity", 3, IntegrityEpoch)
+MONITORS: Final = TableSchema("monitors", 2, MonitorEpoch)
+MONITOR_DETAILS: Final = TableSchema("monitor_details", 1, MonitorDetailEpoch)
 CHANNELS: Final = TableSchema("channels", 1, ChannelEpoch)
-SOLUTION: Final = TableSchema("solution", 1, SolutionEpoch)
-PROTECTION: Final = TableSchema("protection", 1, ProtectionEpoch)
+SOLUTION: Final = TableSchema("solution", 2, SolutionEpoch)
+PROTECTION: Final = TableSchema("protection", 2, ProtectionEpoch)
 PROGRESS: Final = TableSchema("progress", 1, ProgressEpoch)
-TRUTH: Final = TableSchema("truth", 1, TruthEpoch)
+TRUTH: Final = TableSchema("truth", 2, TruthEpoch)
 
 SCHEMAS: Final[dict[str, TableSchema[Any]]] = {
     schema.name: schema
-    for schema in (OBSERVATIONS, EPHEMERIS, INTEGRITY, MONITORS, CHANNELS, SOLUTION, PROTECTION, PROGRESS, TRUTH)
+    for schema in (
+        OBSERVATIONS,
+        EPHEMERIS,
+        INTEGRITY,
+        MONITORS,
+        MONITOR_DETAILS,
+        CHANNELS,
+        SOLUTION,
+        PROTECTION,
+        PROGRESS,
+        TRUTH,
+    )
 }
 
 
@@ -76,5 +102,17 @@ def decode_table(label: str, data: NDArray[np.float64]) -> Record:
 
 
 def schema_dictionary() -> str:
-    """All schemas as one JSON document: what is published on the schemas topic and written into bags."""
-    return json.dumps({"schemas": [schema.describe() for schema in SCHEMAS.values()]}, ensure_ascii=True)
+    """The contract as one JSON document: what is published on the schemas topic and written into bags.
+
+    Tables with their columns, every enumeration, the products, the modes and the monitors: a bag explains itself.
+    """
+    return json.dumps(
+        {
+            "schemas": [schema.describe() for schema in SCHEMAS.values()],
+            "enumerations": enumerations(),
+            "products": product_dictionary(),
+            "modes": mode_dictionary(),
+            "monitors": monitor_dictionary(),
+        },
+        ensure_ascii=True,
+    )

@@ -26,6 +26,7 @@ GROUND_OBSERVATIONS: Final[tuple[str, ...]] = tuple(
 )
 GROUND_INTEGRITY: Final = "ground/integrity"
 GROUND_MONITORS: Final = "ground/monitors"
+GROUND_MONITOR_DETAILS: Final = "ground/monitor_details"
 GROUND_CHANNELS: Final = "ground/channels"
 AIRBORNE_OBSERVATIONS: Final = "airborne/observations"
 AIRBORNE_EPHEMERIS: Final = "airborne/ephemeris"
@@ -91,16 +92,17 @@ TOPICS: Final[tuple[TopicSpec, ...]] = (
     TopicSpec(name=AIRBORNE_OBSERVATIONS, message_type=_TABLE, schema="gbas/observations/1"),
     TopicSpec(name=EPHEMERIS, message_type=_TABLE, schema="gbas/ephemeris/1", latched=True),
     TopicSpec(name=AIRBORNE_EPHEMERIS, message_type=_TABLE, schema="gbas/ephemeris/1", latched=True),
-    TopicSpec(name=GROUND_INTEGRITY, message_type=_TABLE, schema="gbas/integrity/2"),
-    TopicSpec(name=GROUND_MONITORS, message_type=_TABLE, schema="gbas/monitors/1"),
+    TopicSpec(name=GROUND_INTEGRITY, message_type=_TABLE, schema="gbas/integrity/3"),
+    TopicSpec(name=GROUND_MONITORS, message_type=_TABLE, schema="gbas/monitors/2"),
+    TopicSpec(name=GROUND_MONITOR_DETAILS, message_type=_TABLE, schema="gbas/monitor_details/1"),
     TopicSpec(name=GROUND_CHANNELS, message_type=_TABLE, schema="gbas/channels/1"),
     TopicSpec(name=VDB, message_type="std_msgs/msg/UInt8MultiArray", schema="gbas/vdb_burst/1"),
-    TopicSpec(name=AIRBORNE_SOLUTION, message_type=_TABLE, schema="gbas/solution/1"),
-    TopicSpec(name=AIRBORNE_PROTECTION, message_type=_TABLE, schema="gbas/protection/1"),
+    TopicSpec(name=AIRBORNE_SOLUTION, message_type=_TABLE, schema="gbas/solution/2"),
+    TopicSpec(name=AIRBORNE_PROTECTION, message_type=_TABLE, schema="gbas/protection/2"),
     TopicSpec(name=AIRBORNE_FIX, message_type="sensor_msgs/msg/NavSatFix"),
     *(TopicSpec(name=n, message_type=_FLOAT) for n in (AIRBORNE_VPL, AIRBORNE_LPL, AIRBORNE_VAL, AIRBORNE_LAL)),
     TopicSpec(name=AIRBORNE_SERVICE, message_type="std_msgs/msg/UInt8"),
-    TopicSpec(name=TRUTH_AIRBORNE, message_type=_TABLE, schema="gbas/truth/1"),
+    TopicSpec(name=TRUTH_AIRBORNE, message_type=_TABLE, schema="gbas/truth/2"),
     TopicSpec(name=EVENTS, message_type=_STRING, schema="gbas/event/1"),
     TopicSpec(name=SCHEMAS, message_type=_STRING, schema="gbas/schemas/1", latched=True),
     TopicSpec(name=CLOCK, message_type="rosgraph_msgs/msg/Clock"),

@@ -20,6 +20,7 @@ from gbas_ground.monitor_params import EphemerisSection, MonitorParams
 from gbas_ground.monitors.double_difference import DoubleDifferences
 from gbas_ground.monitors.ephemeris_residual import assumed_sigma_m
 from gbas_msgs_py.codes import ChannelState, ExclusionCause
+from gbas_msgs_py.products import L1_30, L1_100
 from ground_runs import half_seconds, params, run
 from monitor_scenes import BRAUNSCHWEIG_M, braunschweig_station, station_of
 from synthetic_ranges import truth
@@ -128,7 +129,7 @@ def ran(receivers: int, seconds: int = 8, **changes: object):
 def broadcast_p(integrity) -> np.ndarray:
     usable = integrity.state == ChannelState.USABLE
     assert usable.sum() >= 4
-    return integrity.p_ephemeris[usable]
+    return integrity.p_ephemeris[L1_100, usable]
 
 
 def test_running_station_broadcasts_what_its_monitor_supports() -> None:
@@ -138,7 +139,7 @@ def test_running_station_broadcasts_what_its_monitor_supports() -> None:
     least = supported_decorrelation(station.orbit_site(), last.elevation_rad[usable])
     assert (broadcast_p(last) >= least - 1e-12).all()
     assert (broadcast_p(last) < MAX_DECORRELATION).all()
-    assert np.array_equal(last.p_ephemeris, last.p_ephemeris_d, equal_nan=True)
+    assert np.array_equal(last.p_ephemeris[L1_100], last.p_ephemeris[L1_30], equal_nan=True)
 
 
 def test_receivers_that_drop_out_take_the_claim_with_them() -> None:
@@ -152,8 +153,9 @@ def test_receivers_that_drop_out_take_the_claim_with_them() -> None:
     four, three, two = (out.integrity[out.seconds.index(second)] for second in (3.5, 5.5, 7.5))
     both = (four.state == ChannelState.USABLE) & (three.state == ChannelState.USABLE)
     assert both.sum() >= 4
-    assert (three.p_ephemeris[both] >= four.p_ephemeris[both]).all()
-    assert (three.p_ephemeris[both] > four.p_ephemeris[both]).sum() > both.sum() / 2  # the others are in one step
+    assert (three.p_ephemeris[L1_100, both] >= four.p_ephemeris[L1_100, both]).all()
+    larger = three.p_ephemeris[L1_100, both] > four.p_ephemeris[L1_100, both]
+    assert larger.sum() > both.sum() / 2  # the others are in one step
     assert broadcast_p(two) == pytest.approx(MAX_DECORRELATION, abs=1e-12)
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from gbas_core.satellites import N_SATS, SAT_INDEX
 from gbas_msgs_py.codes import ChannelState, ExclusionCause
+from gbas_msgs_py.products import L1_100
 from gbas_msgs_py.tables import CHANNELS
 from ground_runs import half_seconds, params, run
 from synthetic_ranges import truth
@@ -81,5 +82,5 @@ def test_every_table_of_a_run_can_be_sent_and_agrees_with_the_integrity():
         again = CHANNELS.decode(CHANNELS.label, CHANNELS.encode(channels))
         assert np.array_equal(again.channel_since_s, channels.channel_since_s, equal_nan=True)
         assert np.array_equal(channels.state, integrity.state, equal_nan=True)
-        used = integrity.receiver_used == 1.0
+        used = integrity.receiver_used[L1_100] == 1.0
         assert np.array_equal(channels.channel_state == ChannelState.USABLE, used)

@@ -66,19 +66,18 @@ def source(number: int, iod: int = 7, *, gast_d: bool = False) -> SourceCorrecti
     correction_30 = m.Correction30(
         ranging_source_id=number, prc_30_m=0.02 * number, rrc_30_mps=0.0, sigma_pr_gnd_d_m=0.2, sigma_pr_gnd_30_m=0.3
     )
+    correction_100 = m.Correction100(
+        ranging_source_id=number,
+        iod=iod,
+        prc_m=0.01 * number,
+        rrc_mps=0.0,
+        sigma_pr_gnd_m=0.2,
+        b_values_m=(0.0, 0.0, NAN, NAN),
+    )
     return SourceCorrection(
-        correction=m.Correction100(
-            ranging_source_id=number,
-            iod=iod,
-            prc_m=0.01 * number,
-            rrc_mps=0.0,
-            sigma_pr_gnd_m=0.2,
-            b_values_m=(0.0, 0.0, NAN, NAN),
-        ),
-        correction_30=correction_30 if gast_d else None,
+        corrections={1: correction_100, 11: correction_30} if gast_d else {1: correction_100},
         ephemeris_crc=1000 * iod + number,
-        ephemeris_decorrelation=number * 5e-6,
-        ephemeris_decorrelation_d=number * 1e-5,
+        decorrelation={1: number * 5e-6, 11: number * 1e-5},
     )
 
 
@@ -119,7 +118,7 @@ def intervals(sent: Sequence[tuple[Burst, ...]], present: Callable[[tuple[Burst,
 
 
 ONE_SLOT = ScheduleParams(station_id="EDVE", slots=(1,))
-TWO_SLOTS_D = ScheduleParams(station_id="EDVE", slots=(0, 3), gast_d=True)
+TWO_SLOTS_D = ScheduleParams(station_id="EDVE", slots=(0, 3), message_types=(1, 11))
 
 
 # ---- one frame ----
@@ -134,7 +133,7 @@ def test_a_frame_carries_the_epoch_and_every_satellite() -> None:
     assert sorted(item.ranging_source_id for item in type1.measurements) == [3, 9, 27]
     first = source(type1.measurements[0].ranging_source_id)
     assert type1.ephemeris_crc == first.ephemeris_crc
-    assert type1.ephemeris_decorrelation == pytest.approx(first.ephemeris_decorrelation, abs=1e-12)
+    assert type1.ephemeris_decorrelation == pytest.approx(first.decorrelation[1], abs=1e-12)
     assert type1.source_availability_s is None
     assert messages([burst], m.Type2)
 
@@ -161,7 +160,7 @@ def test_type11_follows_type1() -> None:
 
 @pytest.mark.parametrize("n_sources", [19, 24, 36])
 def test_more_than_18_satellites_are_a_linked_pair(n_sources: int) -> None:
-    params = ScheduleParams(station_id="EDVE", slots=(0, 1, 2, 3), gast_d=True)
+    params = ScheduleParams(station_id="EDVE", slots=(0, 1, 2, 3), message_types=(1, 11))
     ((*bursts,),) = frames(1, lambda _: [source(number, gast_d=True) for number in range(1, n_sources + 1)], params)
     for kind in (m.Type1, m.Type11):
         first, second = messages(bursts, kind)
@@ -178,14 +177,18 @@ def test_more_than_18_satellites_are_a_linked_pair(n_sources: int) -> None:
 
 def test_no_burst_is_longer_than_222_bytes() -> None:
     for n_sources in range(37):
-        params = ScheduleParams(station_id="EDVE", slots=(0, 1, 2, 3), gast_d=True)
+        params = ScheduleParams(station_id="EDVE", slots=(0, 1, 2, 3), message_types=(1, 11))
         for bursts in frames(3, lambda _, n=n_sources: [source(i, gast_d=True) for i in range(1, n + 1)], params):
             assert all(len(burst.payload) <= 228 for burst in bursts)
 
 
 def test_what_does_not_fit_names_bytes_and_slots() -> None:
     with pytest.raises(ScheduleError, match=r"\(215 \+ 140 bytes\) do not fit slot B of 222 bytes each"):
-        frames(1, lambda _: [source(number, gast_d=True) for number in range(1, 19)], replace(ONE_SLOT, gast_d=True))
+        frames(
+            1,
+            lambda _: [source(number, gast_d=True) for number in range(1, 19)],
+            replace(ONE_SLOT, message_types=(1, 11)),
+        )
     with pytest.raises(ScheduleError, match="37 ranging sources"):
         frames(1, lambda _: [source(number) for number in range(1, 38)], ONE_SLOT)
 
@@ -205,10 +208,10 @@ def test_station_data_that_never_find_room_are_an_error_after_20_frames() -> Non
     [
         (STATION, (), ONE_SLOT),
         (STATION, (approach(1), approach(2)), ONE_SLOT),
-        (STATION, (approach(1),), replace(ONE_SLOT, gast_d=True)),
+        (STATION, (approach(1),), replace(ONE_SLOT, message_types=(1, 11))),
         (STATION, (approach(1), approach(2)), TWO_SLOTS_D),
         (STATION, (approach(1),), replace(TWO_SLOTS_D, slots=(0, 3, 5))),
-        (STATION, (), replace(ONE_SLOT, slots=(0, 1, 2, 3), gast_d=True)),
+        (STATION, (), replace(ONE_SLOT, slots=(0, 1, 2, 3), message_types=(1, 11))),
     ],
 )
 def test_capacity_is_what_can_be_sent(
@@ -217,7 +220,7 @@ def test_capacity_is_what_can_be_sent(
     capacity = sources_that_fit(station, approaches, params)
 
     def some(count: int) -> Callable[[int], list[SourceCorrection]]:
-        return lambda _: [source(number, gast_d=params.gast_d) for number in range(1, count + 1)]
+        return lambda _: [source(number, gast_d=11 in params.message_types) for number in range(1, count + 1)]
 
     sent = frames(45, some(capacity), params, approaches=approaches)
     assert len(sent) == 45
@@ -231,8 +234,13 @@ def test_a_source_twice_is_refused() -> None:
         frames(1, lambda _: [source(3), source(3)], ONE_SLOT)
 
 
-def test_a_source_without_its_30_s_correction_is_refused() -> None:
-    with pytest.raises(ScheduleError, match="ranging source 4 has no 30 s correction"):
+def test_a_source_without_a_type_1_correction_is_refused() -> None:
+    with pytest.raises(ScheduleError, match="no correction for message type 1"):
+        frames(1, lambda _: [replace(source(3), corrections={})], ONE_SLOT)
+
+
+def test_a_source_without_a_correction_of_each_type_is_refused() -> None:
+    with pytest.raises(ScheduleError, match="ranging source 4 has no correction of its own for message type 11"):
         frames(1, lambda _: [source(3, gast_d=True), source(4)], TWO_SLOTS_D)
 
 
@@ -242,6 +250,10 @@ def test_a_source_without_its_30_s_correction_is_refused() -> None:
         ({"slots": ()}, "slots"),
         ({"slots": (3, 1)}, "slots"),
         ({"slots": (0, 8)}, "slots"),
+        ({"message_types": ()}, "message_types"),
+        ({"message_types": (11, 1)}, "message_types"),
+        ({"message_types": (1, 1)}, "message_types"),
+        ({"message_types": (1, 2)}, "message_types"),
         ({"period_frames": 21}, "period_frames"),
         ({"period_frames": 0}, "period_frames"),
         ({"occupancy_min": 1.5}, "occupancy_min"),
@@ -255,7 +267,7 @@ def test_bad_parameters_are_named(change: dict[str, object], reason: str) -> Non
 
 def test_a_value_that_cannot_be_sent_is_named() -> None:
     bad = source(5)
-    bad = replace(bad, correction=replace(bad.correction, prc_m=400.0))
+    bad = replace(bad, corrections={1: replace(bad.type1, prc_m=400.0)})
     with pytest.raises(FieldError, match=r"prc_m = 400\.0 outside -327\.67 to 327\.67 m"):
         frames(1, lambda _: [bad], ONE_SLOT)
 

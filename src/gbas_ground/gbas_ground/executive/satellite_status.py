@@ -18,6 +18,7 @@ from gbas_ground.corrections.sigma import MAX_SIGMA_M
 from gbas_ground.ionosphere.protection import Protection
 from gbas_ground.params import GroundParams
 from gbas_msgs_py.codes import FIRST_LATCHED, ChannelState, ExclusionCause
+from gbas_msgs_py.products import PRODUCTS
 from gbas_msgs_py.records import MAX_REFERENCE_RECEIVERS, IntegrityEpoch
 
 
@@ -128,10 +129,12 @@ def integrity_of(
         return np.where(usable, values, np.nan)
 
     external = bool(params.external_monitor)
-    n_receivers = corrections.used.shape[0]
-    used, b = missing(MAX_REFERENCE_RECEIVERS), missing(MAX_REFERENCE_RECEIVERS)
-    used[:n_receivers] = of_row((corrections.used & usable).astype(np.float64))
-    b[:n_receivers] = of_usable(corrections.b_m[0])
+    # the first products are those of the station's smoothing constants, in their order; it makes no others
+    made = len(corrections.prc_m)
+    claimed = (params.p_ephemeris, params.p_ephemeris_d or params.p_ephemeris)
+    p = [claimed_decorrelation(orbit_bound, each, external=external) for each in claimed]
+    sigma_m = [protection.inflated_m(corrections.sigmas.gnd_m), corrections.sigmas.gnd_30_m]
+    used = of_row((corrections.used & usable).astype(np.float64))
     return IntegrityEpoch(
         gps_week=gps_week,
         tow_s=tow_s,
@@ -140,19 +143,20 @@ def integrity_of(
         state=of_row(status.state),
         cause=of_row(status.cause),
         elevation_rad=of_row(correction_inputs.elevation_rad),
-        p_ephemeris=of_usable(claimed_decorrelation(orbit_bound, params.p_ephemeris, external=external)),
-        p_ephemeris_d=of_usable(
-            claimed_decorrelation(orbit_bound, params.p_ephemeris_d or params.p_ephemeris, external=external)
-        ),
+        p_ephemeris=_on_axis(of_usable(np.array(p)), len(PRODUCTS)),
         iod=of_row(known.current.iod),
         ephemeris_crc=of_row(known.crc),
-        prc_100_m=of_usable(corrections.prc_m[0]),
-        rrc_100_mps=of_usable(corrections.rrc_mps[0]),
-        prc_30_m=of_usable(corrections.prc_m[1]),
-        rrc_30_mps=of_usable(corrections.rrc_mps[1]),
-        sigma_pr_gnd_m=of_usable(protection.inflated_m(corrections.sigmas.gnd_m)),
+        prc_m=_on_axis(of_usable(corrections.prc_m), len(PRODUCTS)),
+        rrc_mps=_on_axis(of_usable(corrections.rrc_mps), len(PRODUCTS)),
+        sigma_pr_gnd_m=_on_axis(of_usable(np.array(sigma_m)), len(PRODUCTS)),
         sigma_pr_gnd_d_m=of_usable(corrections.sigmas.gnd_d_m),
-        sigma_pr_gnd_30_m=of_usable(corrections.sigmas.gnd_30_m),
-        b_m=b,
-        receiver_used=used,
+        b_m=_on_axis(of_usable(corrections.b_m), len(PRODUCTS), MAX_REFERENCE_RECEIVERS),
+        receiver_used=_on_axis(np.stack([used] * made), len(PRODUCTS), MAX_REFERENCE_RECEIVERS),
     )
+
+
+def _on_axis(values: FloatArray, *shape: int) -> FloatArray:
+    """Values of what the station has, on axes that have room for more."""
+    result = missing(*shape)
+    result[tuple(slice(size) for size in values.shape[:-1])] = values
+    return result

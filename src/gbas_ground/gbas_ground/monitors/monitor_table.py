@@ -1,29 +1,44 @@
-"""What each monitor says of each satellite, in the columns of one table."""
+"""What each monitor says of each satellite, in the rows of one table."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from collections.abc import Collection, Mapping
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gbas_core.record import BoolArray, FloatArray
-from gbas_core.satellites import N_SATS, missing
+from gbas_core.satellites import N_SATS, RANGING_SOURCE_ID
+from gbas_core.signals import L1, L2, L5
 from gbas_ground.monitors.result import MonitorResult
-from gbas_msgs_py.codes import MonitorState
-from gbas_msgs_py.records import GROUND_MONITORS, MonitorEpoch
+from gbas_msgs_py.codes import MonitorState, Signal
+from gbas_msgs_py.monitors import TESTS, TestKey
+from gbas_msgs_py.records import MonitorDetailEpoch, MonitorEpoch
 
 IntArray = NDArray[np.intp]
+_SOURCE_ID: Final[FloatArray] = RANGING_SOURCE_ID.astype(np.float64)
 
 
 class MonitorSummary(NamedTuple):
-    """One monitor's view of the satellites, each ``(N,)``: statistic, threshold, what failed, and what was due."""
+    """One test's view of the satellites, each ``(N,)``: statistic, threshold, what failed, what was due; its signal."""
 
     statistic: FloatArray
     threshold: FloatArray
     failed: BoolArray
     due: BoolArray
+    signal: Signal
+
+
+Summaries = Mapping[TestKey, MonitorSummary]
+"""By the numbers of monitor and test; a test that is missing is not due."""
+
+_SIGNAL_OF_BAND: Final = {L1: Signal.L1, L2: Signal.L2, L5: Signal.L5}
+
+
+def signal_of(bands: Collection[int]) -> Signal:
+    """The signal of a test that looks at these bands."""
+    return _SIGNAL_OF_BAND[next(iter(bands))] if len(bands) == 1 else Signal.NONE
 
 
 def place_of_worst(result: MonitorResult, *, axes: int) -> tuple[IntArray, ...]:
@@ -53,8 +68,8 @@ def worst_of(result: MonitorResult, *, axes: int) -> MonitorResult:
     )
 
 
-def summarise(result: MonitorResult, due: BoolArray) -> MonitorSummary:
-    """The worst of a monitor's tests of each satellite.
+def summarise(result: MonitorResult, due: BoolArray, signal: Signal = Signal.L1) -> MonitorSummary:
+    """The worst of what a test compares of each satellite.
 
     Parameters
     ----------
@@ -62,53 +77,60 @@ def summarise(result: MonitorResult, due: BoolArray) -> MonitorSummary:
         ``(..., N)``.
     due : (..., N) bool array
         Where the monitor ought to look; where it does and has no statistic, it did not monitor.
+    signal : Signal
 
     Returns
     -------
     MonitorSummary
-        Statistic and threshold are those of the test that is furthest over its threshold, or nearest to it.
+        Statistic and threshold are those of the comparison that is furthest over its threshold, or nearest to it.
     """
     axes = result.statistic.ndim - 1
     worst = worst_of(result, axes=axes) if axes else result
     expected = due if due.ndim == 1 else np.logical_or.reduce(due.reshape(-1, N_SATS))
-    return MonitorSummary(worst.statistic, worst.threshold, worst.failed, expected)
+    threshold = np.broadcast_to(worst.threshold, worst.statistic.shape)
+    return MonitorSummary(worst.statistic, threshold, worst.failed, expected, signal)
 
 
-def monitor_epoch(
-    gps_week: int,
-    tow_s: float,
-    summaries: Mapping[str, MonitorSummary],
-    details: Mapping[str, Any],
-    shown: BoolArray,
-) -> MonitorEpoch:
-    """The table of what all monitors measured.
+def monitor_epoch(gps_week: int, tow_s: float, summaries: Summaries, shown: BoolArray) -> MonitorEpoch:
+    """The table of what all monitors said.
 
     Parameters
     ----------
     gps_week, tow_s
         The epoch.
     summaries : mapping
-        By the names in :data:`GROUND_MONITORS`; a monitor that is missing is not due.
-    details : mapping
-        Further fields of the table.
     shown : (N,) bool array
-        Satellites that have a row.
+        Satellites that have rows.
     """
-    count = len(GROUND_MONITORS)
-    statistic, threshold = missing(count), missing(count)
-    failed, due = np.zeros((count, N_SATS), dtype=bool), np.zeros((count, N_SATS), dtype=bool)
-    for row, name in enumerate(GROUND_MONITORS):
-        if name in summaries:
-            statistic[row], threshold[row], failed[row], due[row] = summaries[name]
+    keys = [key for key in TESTS if key in summaries]
+    if not keys:
+        return MonitorEpoch(gps_week=gps_week, tow_s=tow_s)
+    columns = zip(*(summaries[key][:4] for key in keys), strict=True)
+    statistic, threshold, failed, due = (np.stack(column) for column in columns)
     looked = np.isfinite(statistic + threshold)
     state = np.where(looked, float(MonitorState.PASSED), float(MonitorState.NOT_MONITORED))
-    state = np.where(due, state, float(MonitorState.NOT_DUE))
-    fields = {
-        "statistic": np.where(looked, statistic, np.nan),
-        "threshold": np.where(looked, threshold, np.nan),
-        "state": np.where(failed, float(MonitorState.FAILED), state),
-        **details,
-    }
+    state = np.where(failed, float(MonitorState.FAILED), state)
+    place, satellite = np.nonzero((due | failed) & shown)
+    monitor, test = np.array(keys, dtype=np.float64).T
+    signal = np.array([float(summaries[key].signal) for key in keys])
+    at = place, satellite
     return MonitorEpoch(
-        gps_week=gps_week, tow_s=tow_s, **{name: np.where(shown, value, np.nan) for name, value in fields.items()}
+        gps_week=gps_week,
+        tow_s=tow_s,
+        monitor=monitor[place],
+        test=test[place],
+        sat=_SOURCE_ID[satellite],
+        signal=signal[place],
+        statistic=np.where(looked, statistic, np.nan)[at],
+        threshold=np.where(looked, threshold, np.nan)[at],
+        state=state[at],
+    )
+
+
+def monitor_detail_epoch(
+    gps_week: int, tow_s: float, details: Mapping[str, Any], shown: BoolArray
+) -> MonitorDetailEpoch:
+    """The table of what is behind the statistics; `details` are its fields."""
+    return MonitorDetailEpoch(
+        gps_week=gps_week, tow_s=tow_s, **{name: np.where(shown, value, np.nan) for name, value in details.items()}
     )

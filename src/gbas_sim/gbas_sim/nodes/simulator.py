@@ -99,7 +99,14 @@ class Simulator(DriverNode[SimulatedEpoch]):
 def _truth_record(truth: Truth) -> TruthEpoch:
     names = ("x_m", "y_m", "z_m", "vx_mps", "vy_mps", "vz_mps")
     values = (*truth.position_m.tolist(), *truth.velocity_mps.tolist())
-    return TruthEpoch(gps_week=truth.gps_week, tow_s=truth.tow_s, **dict(zip(names, values, strict=True)))
+    return TruthEpoch(
+        gps_week=truth.gps_week,
+        tow_s=truth.tow_s,
+        roll_rad=truth.roll_rad,
+        pitch_rad=truth.pitch_rad,
+        heading_rad=truth.heading_rad,
+        **dict(zip(names, values, strict=True)),
+    )
 
 
 def main() -> None:

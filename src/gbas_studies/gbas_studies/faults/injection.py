@@ -20,7 +20,7 @@ from gbas_ground.station import GroundEpoch, GroundStation, Monitored, StationSt
 from gbas_msgs_py.codes import EventKind, MonitorState
 from gbas_msgs_py.events import Event
 from gbas_msgs_py.joining import ReceptionQueue
-from gbas_msgs_py.records import GROUND_MONITORS
+from gbas_msgs_py.products import L1_100
 from gbas_sim.atmosphere.fronts import PlasmaBubble, WedgeFront
 from gbas_sim.faults.kinds import ReceiverFault, SatelliteFault
 from gbas_sim.world import World, WorldParams
@@ -183,7 +183,7 @@ def _steps(
 
 
 def _usable(monitored: Monitored) -> Iterator[str]:
-    used = np.isfinite(monitored.integrity.prc_100_m)
+    used = np.isfinite(monitored.integrity.prc_m[L1_100])
     return (name for name, index in SAT_INDEX.items() if used[index])
 
 
@@ -196,8 +196,8 @@ def _told(subject: str, monitored: Monitored, bursts: tuple[Burst, ...]) -> bool
 
 def _failing(monitored: Monitored, satellite: str) -> Iterator[str]:
     """Monitors that fail a satellite."""
-    states = monitored.statistics.state[:, SAT_INDEX[satellite]]
-    return (name for name, state in zip(GROUND_MONITORS, states, strict=True) if state == MonitorState.FAILED)
+    rows = monitored.statistics.select(sat=satellite).rows()
+    return (f"{row.monitor}/{row.test}" for row in rows if row.state is MonitorState.FAILED)
 
 
 def _sent_as_valid(bursts: tuple[Burst, ...], satellite: str) -> bool:

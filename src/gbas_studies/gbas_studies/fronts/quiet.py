@@ -19,6 +19,7 @@ from gbas_core.satellites import N_SATS
 from gbas_core.signals import IONO_RATIO
 from gbas_ground.params import GroundParams
 from gbas_msgs_py.codes import ServiceType
+from gbas_msgs_py.products import L1_100
 from gbas_sim.atmosphere.fronts import WedgeFront
 from gbas_sim.atmosphere.paths import SignalPaths
 from gbas_sim.world import SimulatedEpoch, World, WorldParams
@@ -142,8 +143,8 @@ def fly(
     for output in chain.run(_recorded(observed, fronts)):
         if isinstance(output, GroundOutput):
             row = places[epoch_key(output.integrity.gps_week, output.integrity.tow_s)]
-            used[row] = np.nan_to_num(output.integrity.receiver_used[:receivers])
-            divergence[row] = output.monitored.statistics.ccd_receiver_mps[:receivers]
+            used[row] = np.nan_to_num(output.integrity.receiver_used[L1_100, :receivers])
+            divergence[row] = output.monitored.details.ccd_receiver_mps[:receivers]
             rows["sigma_vig"][row] = output.integrity.sigma_vert_iono_gradient
         elif isinstance(output, AirborneOutput):
             solution, protection = output.solution, output.protection

@@ -398,6 +398,11 @@ class Layout:
     entries: tuple[Entry, ...]
 
     @cached_property
+    def bits(self) -> int:
+        """Bits of a record without those of its groups."""
+        return sum(_bits_of(entry) for entry in self.entries)
+
+    @cached_property
     def conditional(self) -> tuple[Number, ...]:
         """Entries that are missing when another is."""
         return tuple(entry for entry in self.entries if isinstance(entry, Number) and entry.valid_if is not None)
@@ -412,6 +417,20 @@ class Layout:
         """The quick codec, where every field is a number at a fixed place; None elsewhere."""
         simple = all(isinstance(entry, Number | Spare | Vector) for entry in self.entries)
         return FixedPlaces(self) if simple else None
+
+
+def _bits_of(entry: Entry) -> int:
+    match entry:
+        case Group():
+            return 0
+        case Part():
+            return entry.layout.bits
+        case Vector():
+            return entry.length * entry.item.bits
+        case Switch():
+            return entry.default.bits
+        case _:
+            return entry.bits
 
 
 class FixedPlaces:

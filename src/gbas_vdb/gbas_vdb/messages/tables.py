@@ -412,6 +412,9 @@ TYPE_5: Final = Layout(
 # Messages that one table describes; types 2 and 4 have tails with lengths of their own.
 WHOLE_MESSAGES: Final[dict[int, Layout]] = {1: TYPE_1, 5: TYPE_5, 11: TYPE_11}
 
+# Messages with corrections, and the layout of one ranging source in each.
+CORRECTION_ENTRIES: Final[dict[int, Layout]] = {1: CORRECTION_100, 11: CORRECTION_30}
+
 # Of the header; the message block identifier and the length are in block.py.
 STATION_ID: Final = Text(name="station_id", characters=4, bits_per_character=6, doc="GBAS identification")
 MESSAGE_TYPE: Final = Number(name="message_type", bits=8)

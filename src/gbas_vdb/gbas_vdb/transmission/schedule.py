@@ -9,7 +9,7 @@ Source: ICAO Annex 10 vol. I, App. B 3.6.3, 3.6.4 and table B-75; RTCA DO-246E (
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Final
@@ -50,8 +50,8 @@ class ScheduleParams:
         GBAS identification.
     slots : tuple of int
         Assigned slots, 0 (A) to 7 (H), ascending; the station slot identifier is the first.
-    gast_d : bool
-        Send type 11 messages; every source then needs a `correction_30`.
+    message_types : tuple of int
+        Messages with corrections, type 1 first; every source needs a correction for each.
     test : bool
         Mark every block as a test.
     period_frames : int
@@ -63,7 +63,7 @@ class ScheduleParams:
 
     station_id: str
     slots: tuple[int, ...] = (0,)
-    gast_d: bool = False
+    message_types: tuple[int, ...] = (1,)
     test: bool = False
     period_frames: int = 20
     occupancy_min: float = 0.95
@@ -79,6 +79,9 @@ class ScheduleParams:
         tables.STATION_ID.to_raw(self.station_id)
         if not self.slots or list(self.slots) != sorted(set(self.slots)) or not set(self.slots) <= set(range(8)):
             raise ValueError(f"slots = {self.slots!r}: ascending numbers of 0 (A) to 7 (H) are wanted")
+        types, known = self.message_types, tables.CORRECTION_ENTRIES
+        if types[:1] != (1,) or len(set(types)) != len(types) or not set(types) <= set(known):
+            raise ValueError(f"message_types = {types!r}: 1 and then others of {', '.join(map(str, known))} are wanted")
         if not 1 <= self.period_frames <= 20:
             raise ValueError(f"period_frames = {self.period_frames!r} outside 1 to 20")
         if not 0.0 <= self.occupancy_min <= 1.0:
@@ -96,22 +99,38 @@ class SourceCorrection:
 
     Attributes
     ----------
-    correction : Correction100
-    correction_30 : Correction30 or None
-        None where the station does not send type 11.
+    corrections : mapping of int to Correction100 or Correction30
+        By the type of the message that carries it.
     ephemeris_crc : int
-    ephemeris_decorrelation, ephemeris_decorrelation_d : float
-        P and P_D [m/m].
+    decorrelation : mapping of int to float
+        P of each message [m/m].
     source_availability_s : float or None
         None: not provided.
     """
 
-    correction: Correction100
-    correction_30: Correction30 | None = None
+    corrections: Mapping[int, Correction100 | Correction30]
     ephemeris_crc: int
-    ephemeris_decorrelation: float
-    ephemeris_decorrelation_d: float = float("nan")
+    decorrelation: Mapping[int, float]
     source_availability_s: float | None = None
+
+    @property
+    def type1(self) -> Correction100:
+        """The correction that every station sends.
+
+        Raises
+        ------
+        ScheduleError
+            When there is none.
+        """
+        correction = self.corrections.get(1)
+        if not isinstance(correction, Correction100):
+            raise ScheduleError("a ranging source has no correction for message type 1")
+        return correction
+
+    @property
+    def number(self) -> int:
+        """The ranging source identifier."""
+        return self.type1.ranging_source_id
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -228,60 +247,59 @@ def _names(slots: Sequence[int]) -> str:
 def _correction_messages(
     state: ScheduleState, frame: Frame, params: ScheduleParams
 ) -> tuple[list[Type1 | Type11], dict[int, SourceHistory]]:
-    by_source = {source.correction.ranging_source_id: source for source in frame.sources}
+    by_source = {source.number: source for source in frame.sources}
     if len(by_source) != len(frame.sources):
         raise ScheduleError("a ranging source is there twice")
     if len(by_source) > _MAX_SOURCES:
         raise ScheduleError(f"{len(by_source)} ranging sources; a linked pair of messages holds {_MAX_SOURCES}")
     places = _places(len(by_source))
-    keys = {number: (source.correction.iod, source.ephemeris_crc) for number, source in by_source.items()}
+    keys = {number: (source.type1.iod, source.ephemeris_crc) for number, source in by_source.items()}
     first, history = choose_first(state.sources, keys, state.frame, places)
     rest = [number for number in sorted(by_source) if number not in first]
-    sizes = _group_sizes(len(by_source), params.gast_d, params.slots)
+    sizes = _group_sizes(len(by_source), params.message_types, params.slots)
     z_count_s = modified_z_count_s(frame.tow_s)
-    messages: list[Type1 | Type11] = []
+    groups: list[tuple[int, tuple[SourceCorrection, ...]]] = []
     for place, size in enumerate(sizes):
         order = [*first[place : place + 1], *rest[: max(size - 1, 0)]]
         del rest[: max(size - 1, 0)]
-        group = tuple(by_source[number] for number in order)
         flag = 0 if places == 1 else (1, 3)[place]
-        messages.append(_type1(group, z_count_s, flag))
-        if params.gast_d:
-            messages.append(_type11(group, z_count_s, flag))
-    return sorted(messages, key=lambda message: isinstance(message, Type11)), history
+        groups.append((flag, tuple(by_source[number] for number in order)))
+    messages = [_MESSAGES[kind](group, z_count_s, flag) for kind in params.message_types for flag, group in groups]
+    return messages, history
 
 
 def _type1(group: Sequence[SourceCorrection], z_count_s: float, flag: int) -> Type1:
-    measurements = tuple(source.correction for source in group)
     if not group:
         return Type1(modified_z_count_s=z_count_s, additional_message_flag=flag)
     return Type1(
         modified_z_count_s=z_count_s,
         additional_message_flag=flag,
-        ephemeris_decorrelation=group[0].ephemeris_decorrelation,
+        ephemeris_decorrelation=group[0].decorrelation.get(1, math.nan),
         ephemeris_crc=group[0].ephemeris_crc,
         source_availability_s=group[0].source_availability_s,
-        measurements=measurements,
+        measurements=tuple(source.type1 for source in group),
     )
 
 
 def _type11(group: Sequence[SourceCorrection], z_count_s: float, flag: int) -> Type11:
     measurements = []
     for source in group:
-        if (
-            source.correction_30 is None
-            or source.correction_30.ranging_source_id != source.correction.ranging_source_id
-        ):
-            raise ScheduleError(
-                f"ranging source {source.correction.ranging_source_id} has no 30 s correction of its own"
-            )
-        measurements.append(source.correction_30)
+        correction = source.corrections.get(11)
+        if not isinstance(correction, Correction30) or correction.ranging_source_id != source.number:
+            raise ScheduleError(f"ranging source {source.number} has no correction of its own for message type 11")
+        measurements.append(correction)
     return Type11(
         modified_z_count_s=z_count_s,
         additional_message_flag=flag,
-        ephemeris_decorrelation_d=group[0].ephemeris_decorrelation_d if group else float("nan"),
+        ephemeris_decorrelation_d=group[0].decorrelation.get(11, math.nan) if group else math.nan,
         measurements=tuple(measurements),
     )
+
+
+_MESSAGES: Final[dict[int, Callable[[Sequence[SourceCorrection], float, int], Type1 | Type11]]] = {
+    1: _type1,
+    11: _type11,
+}
 
 
 def _place_corrections(slots: Sequence[_Slot], blocks: Sequence[bytes]) -> None:
@@ -401,9 +419,8 @@ def sources_that_fit(station: Type2, approaches: Sequence[FasDataSet | UnknownDa
         Frame(gps_week=0, tow_s=0.0, sources=(), station=station, approaches=tuple(approaches)), params
     )
     for n_sources in range(_MAX_SOURCES, -1, -1):
-        room = _room(
-            _correction_lengths(_group_sizes(n_sources, params.gast_d, params.slots), params.gast_d), params.slots
-        )
+        sizes = _group_sizes(n_sources, params.message_types, params.slots)
+        room = _room(_correction_lengths(sizes, params.message_types), params.slots)
         if all(len(item.data) + (_WRAPPER_BYTES if item.is_data_set else 0) <= room for item in items):
             return n_sources
     raise ScheduleError(
@@ -416,20 +433,24 @@ def _places(n_sources: int) -> int:
     return 2 if n_sources > tables.MAX_MEASUREMENTS else 1
 
 
-def _correction_lengths(sizes: Sequence[int], gast_d: bool) -> list[int]:
-    lengths = [_WRAPPER_BYTES + 7 + 11 * size for size in sizes]
-    return lengths + ([_WRAPPER_BYTES + 4 + 7 * size for size in sizes] if gast_d else [])
+def _correction_lengths(sizes: Sequence[int], types: Sequence[int]) -> list[int]:
+    """Bytes of each message."""
+    return [
+        _WRAPPER_BYTES + (tables.WHOLE_MESSAGES[kind].bits + size * tables.CORRECTION_ENTRIES[kind].bits) // 8
+        for kind in types
+        for size in sizes
+    ]
 
 
 @lru_cache(maxsize=256)
-def _group_sizes(n_sources: int, gast_d: bool, slots: tuple[int, ...]) -> tuple[int, ...]:
+def _group_sizes(n_sources: int, types: tuple[int, ...], slots: tuple[int, ...]) -> tuple[int, ...]:
     """Satellites in each message of a linked pair: the division that leaves most room in one burst."""
     if _places(n_sources) == 1:
         return (n_sources,)
     best, most_room = (-(-n_sources // 2), n_sources // 2), -1
     for larger in range(best[0], tables.MAX_MEASUREMENTS + 1):
         sizes = (larger, n_sources - larger)
-        room = _room(_correction_lengths(sizes, gast_d), slots)
+        room = _room(_correction_lengths(sizes, types), slots)
         if room > most_room:
             best, most_room = sizes, room
     return best
