@@ -88,6 +88,23 @@ def test_unknown_schema_version_is_named(checked: Any) -> None:
     assert any("version '9'" in problem.what for problem in result.problems)
 
 
+def test_tables_of_an_older_version_are_told_once_and_what_can_be_done(checked: Any) -> None:
+    def change(fake: Any) -> None:
+        for topic, name in ((SOLUTION, b"solution"), (PROTECTION, b"protection")):
+            new, old = b"gbas/" + name + b"/2", b"gbas/" + name + b"/1"
+            fake.content[topic] = [(key, data.replace(new, old)) for key, data in fake.content[topic]]
+
+    result = checked(change)
+    assert [(problem.topic, problem.what) for problem in result.problems] == [
+        (SOLUTION, "40 tables are gbas/solution/1, and gbas/solution/2 is read: not checked"),
+        (PROTECTION, "40 tables are gbas/protection/1, and gbas/protection/2 is read: not checked"),
+    ]
+    assert result.notes == [
+        "written with older versions of protection/1 (read: 2), solution/1 (read: 2); its observations and ephemerides "
+        "are read: gbas replay makes the rest anew"
+    ]
+
+
 def test_schema_of_another_topic_is_named(checked: Any) -> None:
     def change(fake: Any) -> None:
         fake.content[SOLUTION][5] = fake.content[PROTECTION][5]

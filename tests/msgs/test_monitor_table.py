@@ -163,12 +163,16 @@ toy = monitors.Monitor(number=99, name="toy", judges=("satellite",), tests=(test
 monitors.MONITORS += (toy,)
 monitors.TESTS[99, 1] = (toy, test)
 products.PRODUCTS += (products.Product(name="l5_60", signal=Signal.L5, smoothing_s=60.0, message_type=12, doc="toy"),)
+from gbas_msgs_py import modes
+values = {"signal": Signal.L5, "smoothing_s": 60.0, "product": "l5_60", "service": modes.MODES[0].service, "doc": "toy"}
+modes.PRODUCT_INDEX["l5_60"] = 2
+modes.MODES += (modes.Mode(number=99, name="l5_60", **values),)
 import numpy as np
 from gbas_core.satellites import N_SATS
 from gbas_ground.monitors import registry
 from gbas_ground.monitors.monitor_table import monitor_epoch, summarise
 from gbas_ground.monitors.result import MonitorResult
-from gbas_msgs_py import tables
+from gbas_msgs_py import document, tables
 result = MonitorResult(statistic=np.full(N_SATS, 2.0), threshold=np.array(1.0), failed=np.arange(N_SATS) == 3)
 every = np.ones(N_SATS, dtype=bool)
 table = monitor_epoch(2300, 0.5, {toy.key("size"): summarise(result, every, Signal.L5)}, every)
@@ -178,11 +182,12 @@ print(json.dumps({
     "registry": registry.MONITORS[-1].name,
     "columns": tables.INTEGRITY.columns,
     "dictionary": json.loads(tables.schema_dictionary()),
+    "page": document.contract_text(),
 }))
 """
 
 
-def test_a_toy_monitor_and_a_toy_product_need_one_entry_each() -> None:
+def test_a_toy_monitor_product_and_mode_need_one_entry_each() -> None:
     """In a process of its own: the tables of the contract are made when they are imported."""
     done = subprocess.run([sys.executable, "-c", TOY], capture_output=True, text=True, check=True)
     made = json.loads(done.stdout)
@@ -194,6 +199,13 @@ def test_a_toy_monitor_and_a_toy_product_need_one_entry_each() -> None:
     assert dictionary["monitors"][-1]["tests"] == [
         {"number": 1, "name": "size", "cause": "carrier_step", "unit": "m", "doc": "size of the toy"}
     ]
-    assert dictionary["products"][-1]["name"] == "l5_60"
+    assert dictionary["products"][-1]["name"] == dictionary["modes"][-1]["product"] == "l5_60"
+    for line in (
+        "| `toy` | `size` | 99, 1 |",
+        "| `l5_60` | L5 | 60 s | 12 | toy |",
+        "| 99 | `l5_60` |",
+        "| `prc_l5_60_m` |",
+    ):
+        assert line in made["page"]
     described = {each["schema"]: each["columns"] for each in dictionary["schemas"]}["gbas/integrity/3"]
     assert {"name": "prc_l5_60_m", "unit": "m", "doc": "pseudorange correction"} in described

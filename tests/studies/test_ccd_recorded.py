@@ -9,8 +9,8 @@ from gbas_core.io.recording import RecordedEpoch
 from gbas_core.io.rtcm import read_rtcm
 from gbas_core.ranging.divergence import GROUND
 from gbas_core.satellites import SAT_INDEX
-from gbas_ground.monitors.code_carrier_divergence import CcdParams
-from gbas_ground.monitors.two_frequency_divergence import TwoFrequencyParams, threshold
+from gbas_ground.monitors.ccd import CcdParams
+from gbas_ground.monitors.ccd_f import TwoFrequencyParams, threshold
 from gbas_studies.ccd.empirical import cross_validated
 from gbas_studies.ccd.injected import ANTENNAS_M
 from gbas_studies.ccd.recorded import (

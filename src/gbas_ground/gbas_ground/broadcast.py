@@ -19,7 +19,7 @@ from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import IS_GALILEO, RANGING_SOURCE_ID
 from gbas_ground.claims.orbit_claim import MAX_DECORRELATION
 from gbas_ground.corrections.sigma import MAX_SIGMA_M
-from gbas_ground.monitors.multiple_reference import MAX_B_VALUE_M
+from gbas_ground.monitors.b_value import MAX_B_VALUE_M
 from gbas_ground.params import GCID_UNHEALTHY, MAX_SIGMA_VIG, MIN_SERVICE_SATELLITES, GroundParams
 from gbas_msgs_py.codes import ChannelState
 from gbas_msgs_py.products import PRODUCTS

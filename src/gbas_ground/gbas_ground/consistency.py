@@ -16,9 +16,9 @@ from gbas_core.satellites import CLOCK_GROUPS, N_SATS, SAT_IDS
 from gbas_ground.corrections import formation as form
 from gbas_ground.corrections.sigma import Sigmas, broadcast_sigmas
 from gbas_ground.exclusions import Latch, exclude, initial_latch
+from gbas_ground.monitors.b_value import channel_sigma_m, check_b_values, check_unused
 from gbas_ground.monitors.correction_limits import check_correction
 from gbas_ground.monitors.monitor_table import Summaries, summarise
-from gbas_ground.monitors.multiple_reference import channel_sigma_m, check_b_values, check_unused
 from gbas_ground.monitors.result import MonitorResult
 from gbas_ground.params import GroundParams
 from gbas_msgs_py.codes import ExclusionCause

@@ -22,15 +22,15 @@ from gbas_core.signals import BAND_INDEX, BANDS
 from gbas_ground.declared import Declared, nested, parameter
 from gbas_ground.monitors.carrier_acceleration import STATISTICS, CarrierAccelerationParams
 from gbas_ground.monitors.carrier_noise import CarrierNoise
-from gbas_ground.monitors.code_carrier_divergence import CcdParams
+from gbas_ground.monitors.ccd import CcdParams
+from gbas_ground.monitors.ccd_f import DEGREES_OF_FREEDOM, Form, TwoFrequencyParams, threshold
 from gbas_ground.monitors.divergence_covariance import Matrix3, StatisticCovariance
 from gbas_ground.monitors.ephemeris_residual import EphemerisResidualParams
+from gbas_ground.monitors.expected_power import PowerExpectationParams
 from gbas_ground.monitors.false_alarm import EPOCH_S, FALSE_EXCLUSION, exposure_probability
 from gbas_ground.monitors.gradient_detectability import GRADIENT_RANGE, P_MISSED_DETECTION
 from gbas_ground.monitors.ionosphere_gradient import IonosphereGradientParams
-from gbas_ground.monitors.power_expectation import PowerExpectationParams
 from gbas_ground.monitors.sigma_monitor import SigmaMonitorParams
-from gbas_ground.monitors.two_frequency_divergence import DEGREES_OF_FREEDOM, Form, TwoFrequencyParams, threshold
 
 _DEGREE: Final = math.pi / 180.0
 _PROBABILITY: Final = {"low": 1e-12, "high": 0.1}

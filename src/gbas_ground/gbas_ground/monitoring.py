@@ -27,7 +27,15 @@ from gbas_ground.monitors.carrier_acceleration import (
     carrier_acceleration_step,
     initial_carrier_acceleration,
 )
-from gbas_ground.monitors.code_carrier_divergence import CcdParams, ccd_step, initial_ccd
+from gbas_ground.monitors.ccd import CcdParams, ccd_step, initial_ccd
+from gbas_ground.monitors.ccd_f import (
+    TwoFrequencyEpoch,
+    TwoFrequencyInput,
+    TwoFrequencyParams,
+    TwoFrequencyState,
+    initial_two_frequency,
+    two_frequency_step,
+)
 from gbas_ground.monitors.common_slip import check_common_slip
 from gbas_ground.monitors.divergence_classification import MODES, NO_FAULT, classify
 from gbas_ground.monitors.double_difference import (
@@ -43,6 +51,12 @@ from gbas_ground.monitors.ephemeris_residual import (
     ephemeris_residual_step,
     initial_ephemeris_residual,
 )
+from gbas_ground.monitors.expected_power import (
+    PowerExpectationParams,
+    PowerExpectationState,
+    initial_power_expectation,
+    power_expectation_step,
+)
 from gbas_ground.monitors.ionosphere_gradient import (
     GradientResult,
     GradientSite,
@@ -51,22 +65,8 @@ from gbas_ground.monitors.ionosphere_gradient import (
     gradient_site,
 )
 from gbas_ground.monitors.monitor_table import Summaries, place_of_worst, signal_of, summarise, worst_of
-from gbas_ground.monitors.power_expectation import (
-    PowerExpectationParams,
-    PowerExpectationState,
-    initial_power_expectation,
-    power_expectation_step,
-)
 from gbas_ground.monitors.result import MonitorResult
 from gbas_ground.monitors.shared_receiver import Planes, SharedReceiver, planes_of, seen_quiet, shared_receiver
-from gbas_ground.monitors.two_frequency_divergence import (
-    TwoFrequencyEpoch,
-    TwoFrequencyInput,
-    TwoFrequencyParams,
-    TwoFrequencyState,
-    initial_two_frequency,
-    two_frequency_step,
-)
 from gbas_ground.params import GroundParams
 from gbas_msgs_py.codes import ExclusionCause, Signal
 from gbas_msgs_py.monitors import (
@@ -565,7 +565,11 @@ def _power(
     if exclude and found.channels.failed.any():
         channels = (Verdict(ExclusionCause.EXPECTED_POWER, worst_of(_moved(found.channels, 1, 0), axes=1)),)
     return state, _MonitorOutput(
-        summaries={EXPECTED_POWER.key("satellite"): summarise(satellites, np.logical_or.reduce(due))},
+        summaries={
+            EXPECTED_POWER.key("satellite"): summarise(
+                satellites, np.logical_or.reduce(due), signal_of(settings.power.bands)
+            )
+        },
         satellites=_verdicts(exclude, (ExclusionCause.EXPECTED_POWER, satellites), inputs.due),
         channels=channels,
     )

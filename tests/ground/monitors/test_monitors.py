@@ -9,10 +9,10 @@ from scipy import stats
 from gbas_core.models.error_models import sigma_pr_gnd
 from gbas_core.satellites import N_SATS
 from gbas_ground.corrections.formation import b_values_m, clock_weights, receiver_clock_m
+from gbas_ground.monitors.b_value import MAX_B_VALUE_M, channel_sigma_m, check_b_values, check_unused
 from gbas_ground.monitors.correction_limits import check_correction
 from gbas_ground.monitors.ephemeris_change import check_ephemeris_change
 from gbas_ground.monitors.expected_range import check_expected_range
-from gbas_ground.monitors.multiple_reference import MAX_B_VALUE_M, channel_sigma_m, check_b_values, check_unused
 from gbas_ground.monitors.signal_power import check_signal_power
 from synthetic_ranges import TOW_S, WEEK, constellation
 

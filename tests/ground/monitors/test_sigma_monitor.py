@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import chi2, norm
 
 from gbas_core.satellites import N_SATS
-from gbas_ground.monitors.multiple_reference import check_b_values
+from gbas_ground.monitors.b_value import check_b_values
 from gbas_ground.monitors.sigma_monitor import (
     SigmaMonitorParams,
     estimate_distribution,

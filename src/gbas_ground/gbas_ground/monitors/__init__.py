@@ -1,4 +1,4 @@
-"""Monitors of the ground station, one a module.
+"""Monitors of the ground station, one a module of its name; :mod:`~.registry` lists them.
 
 A monitor is a pure function of arrays on the satellite axis. It is told what to look at and its threshold, and returns
 a :class:`~gbas_ground.monitors.result.MonitorResult`: statistic, threshold and the mask of what failed. What a monitor
@@ -8,8 +8,8 @@ business but the executive's (:mod:`gbas_ground.exclusions`).
 ===================================  ==========================================================
 :mod:`~.expected_range`              raw pseudorange against the expected one
 :mod:`~.signal_power`                C/N0: absolute minimum
-:mod:`~.power_expectation`           C/N0 against the expectation at the elevation
-:mod:`~.multiple_reference`          B values (MRCC)
+:mod:`~.expected_power`              C/N0 against the expectation at the elevation
+:mod:`~.b_value`                     B values (MRCC)
 :mod:`~.sigma_monitor`               mean and variance of the B values over time
 :mod:`~.correction_limits`           size of PRC and RRC
 :mod:`~.carrier_acceleration`        step, rate and acceleration of the carrier
@@ -19,8 +19,8 @@ business but the executive's (:mod:`gbas_ground.exclusions`).
 :mod:`~.shared_receiver`             the receiver behind double differences that trip together
 :mod:`~.ephemeris_residual`          double-difference carriers: the orbit, and the P a site can claim
 :mod:`~.ephemeris_change`            a new ephemeris against the one before
-:mod:`~.code_carrier_divergence`     code-carrier divergence of single bands (GAST D)
-:mod:`~.two_frequency_divergence`    the same on two bands, without ionosphere (proposed for GAST F)
+:mod:`~.ccd`                         code-carrier divergence of single bands (GAST D)
+:mod:`~.ccd_f`                       the same on two bands, without ionosphere (proposed for GAST F)
 :mod:`~.divergence_covariance`       covariance of its statistics, calibrated from data
 :mod:`~.divergence_classification`   which of the fifteen fault modes it looks like
 ===================================  ==========================================================

@@ -11,7 +11,7 @@ correlation matrix, and its tail is that sum's (saddle point). A chi-square dist
 of freedom has the right variance, but its tail at 1e-9 is too thin by a factor of up to 2000.
 
 It is slow: what it finds at once is several times the sigma; half again as much takes the long window. Faults of a
-single epoch are the B value check's (:mod:`~gbas_ground.monitors.multiple_reference`).
+single epoch are the B value check's (:mod:`~gbas_ground.monitors.b_value`).
 
 Axes: windows W, smoothing constants T, receivers R, satellites N.
 
@@ -260,7 +260,7 @@ def normalised_b(b_m: FloatArray, sigma_m: FloatArray, used: BoolArray) -> Float
     b_m : (T, R, N) array
         B values [m].
     sigma_m : (T, N) array
-        Sigma of one receiver's correction, :func:`~gbas_ground.monitors.multiple_reference.channel_sigma_m` [m].
+        Sigma of one receiver's correction, :func:`~gbas_ground.monitors.b_value.channel_sigma_m` [m].
     used : (R, N) bool array
         Receivers behind each satellite.
 

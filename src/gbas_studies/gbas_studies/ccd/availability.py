@@ -22,7 +22,7 @@ from gbas_core.models.error_models import sigma_air, sigma_pr_gnd
 from gbas_core.ranging.combinations import ionosphere_free_sigma
 from gbas_core.record import FloatArray
 from gbas_core.signals import L1, L5
-from gbas_ground.monitors.two_frequency_divergence import TwoFrequencyParams
+from gbas_ground.monitors.ccd_f import TwoFrequencyParams
 from gbas_sim.satellites.constellation import nominal_slots
 from gbas_studies.reproduction.drawing import LIMIT_COLOUR, new_figure
 from gbas_studies.reproduction.items import Claim, Item, Picture, Section, Value

@@ -20,10 +20,8 @@ from gbas_core.ranging.fault_modes import fault_direction
 from gbas_core.record import FloatArray
 from gbas_core.satellites import N_SATS, SAT_IDS
 from gbas_core.signals import L1, L5
-from gbas_ground.monitors.code_carrier_divergence import CcdParams, ccd_step, initial_ccd
-from gbas_ground.monitors.divergence_classification import classify
-from gbas_ground.monitors.divergence_covariance import StatisticCovariance
-from gbas_ground.monitors.two_frequency_divergence import (
+from gbas_ground.monitors.ccd import CcdParams, ccd_step, initial_ccd
+from gbas_ground.monitors.ccd_f import (
     TwoFrequencyInput,
     TwoFrequencyParams,
     TwoFrequencyState,
@@ -33,6 +31,8 @@ from gbas_ground.monitors.two_frequency_divergence import (
     threshold,
     two_frequency_step,
 )
+from gbas_ground.monitors.divergence_classification import classify
+from gbas_ground.monitors.divergence_covariance import StatisticCovariance
 from gbas_sim.atmosphere.fronts import WedgeFront
 from gbas_sim.atmosphere.ionosphere import IonosphereParams
 from gbas_sim.atmosphere.troposphere import Troposphere

@@ -9,7 +9,7 @@ import pytest
 
 from gbas_core.satellites import N_SATS
 from gbas_core.signals import L1, L5, N_BANDS
-from gbas_ground.monitors.power_expectation import (
+from gbas_ground.monitors.expected_power import (
     N_BINS,
     PowerExpectationParams,
     initial_power_expectation,

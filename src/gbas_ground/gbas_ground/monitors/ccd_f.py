@@ -48,7 +48,7 @@ from gbas_core.ranging.divergence import (
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import CLOCK_GROUPS, N_SATS
 from gbas_core.signals import BANDS, L1, L5, N_BANDS, SPEED_OF_LIGHT_MPS
-from gbas_ground.monitors.code_carrier_divergence import receiver_mean
+from gbas_ground.monitors.ccd import receiver_mean
 from gbas_ground.monitors.divergence_covariance import PRINTED_COVARIANCE, StatisticCovariance
 from gbas_ground.monitors.expected_range import row_median
 from gbas_ground.monitors.result import MonitorResult, upper_limit

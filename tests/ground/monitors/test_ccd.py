@@ -7,7 +7,7 @@ import pytest
 
 from gbas_core.ranging.divergence import DivergenceParams, ramp_response
 from gbas_core.signals import L1, L2, L5, N_BANDS
-from gbas_ground.monitors.code_carrier_divergence import CcdParams, ccd_step, initial_ccd
+from gbas_ground.monitors.ccd import CcdParams, ccd_step, initial_ccd
 
 N = 68
 T_S = 0.5
