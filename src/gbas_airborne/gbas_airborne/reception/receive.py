@@ -145,7 +145,7 @@ def receive(state: ReceiveState, epoch: AirborneEpoch, params: AirborneParams) -
 def _admit(state: ReceiveState, epoch: AirborneEpoch, events: EventLog) -> tuple[ReceiveState, Arrival]:
     """Whether the epoch comes after the last one; a state that starts anew when time goes on from an earlier one."""
     order, arrival = state.order.step(epoch.epoch_ms)
-    back_s = -state.order.since_last_s(epoch.epoch_ms)
+    back_s = 0.0 - state.order.since_last_s(epoch.epoch_ms)  # never minus zero
     if arrival is Arrival.REFUSED:
         events.add(EventKind.INPUT, "observations", "time_backwards", back_s, 0.0)
     elif arrival is Arrival.RESTART:
