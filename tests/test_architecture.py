@@ -73,7 +73,17 @@ ROOMS = {
         "station",
         "nodes",
     ),
-    "gbas_airborne": ("reception", "ranging", "navigation", "protection", "service", "receiver", "nodes"),
+    "gbas_airborne": (
+        "modes",
+        "reception",
+        "ranging",
+        "navigation",
+        "report",
+        "protection",
+        "service",
+        "receiver",
+        "nodes",
+    ),
     "gbas_sim": (
         "keys",
         "random_processes",

@@ -10,12 +10,13 @@ import pytest
 
 from airborne_world import Flight, World, position_of
 from gbas_airborne.params import AirborneParams
-from gbas_airborne.ranging.corrected_ranges import MILLISECOND_M, millisecond_step_m
-from gbas_airborne.receiver import RESTART_AFTER_REFUSED, AirborneEpoch
+from gbas_airborne.reception.receive import AirborneEpoch
+from gbas_core.gnss.epoch_order import RESTART_AFTER_REFUSED
 from gbas_core.gnss.gpstime import add_seconds
 from gbas_core.satellites import missing
 from gbas_core.signals import L1, SPEED_OF_LIGHT_MPS
 
+MILLISECOND_M = 1e-3 * SPEED_OF_LIGHT_MPS
 PARAMS = AirborneParams(settle_s=5.0, inflate_unsettled=False)
 DURATION_S = 12.0
 
@@ -147,20 +148,6 @@ def test_a_clock_step_of_the_code_alone(milliseconds: int) -> None:
         flight.step(t, observations=replace(observations, carrier_m=carrier))
         assert flight.protections[-1].alert == 0.0
         assert error_m(flight, t) < 1e-3
-
-
-def test_a_step_that_is_no_millisecond_is_no_clock_step() -> None:
-    change = np.zeros(68)
-    assert millisecond_step_m(change + 0.4 * MILLISECOND_M, change) == 0.0
-    assert millisecond_step_m(change + 0.9 * MILLISECOND_M, change) == 0.0
-    assert millisecond_step_m(change + MILLISECOND_M + 5.0, change) == pytest.approx(MILLISECOND_M)
-
-
-def test_a_step_of_some_satellites_is_no_clock_step() -> None:
-    change, code = np.zeros(68), np.zeros(68)
-    code[:30] = MILLISECOND_M
-    assert millisecond_step_m(code, change) == 0.0
-    assert millisecond_step_m(missing(), change) == 0.0
 
 
 # --- numbers that are none

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from gbas_core.gnss.ephemeris import Ephemeris
+from gbas_core.gnss.epoch_order import RESTART_AFTER_REFUSED
 from gbas_core.gnss.gpstime import SECONDS_PER_WEEK, add_seconds
 from gbas_core.gnss.observations import ObservationEpoch
 from gbas_core.satellites import IS_GALILEO, IS_GPS, N_SATS, SAT_INDEX
 from gbas_core.signals import L1, SPEED_OF_LIGHT_MPS
 from gbas_ground.params import watching
-from gbas_ground.station import RESTART_AFTER_REFUSED, GroundEpoch, GroundStation
+from gbas_ground.station import GroundEpoch, GroundStation
 from gbas_msgs_py.codes import ChannelState, ExclusionCause, MonitorState
 from gbas_msgs_py.products import L1_30, L1_100
 from ground_runs import half_seconds, params, run

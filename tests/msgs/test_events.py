@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gbas_msgs_py.codes import EventKind
-from gbas_msgs_py.events import Event, EventError
+from gbas_msgs_py.events import Event, EventError, EventLog
 
 EXAMPLE = Event(
     gps_week=2300, tow_s=12.5, kind=EventKind.EXCLUSION, subject="rr2/G05", cause="b_value", value=0.75, threshold=0.5
@@ -82,3 +82,16 @@ def test_what_is_not_an_event_is_refused_by_name(text: str, complaint: str) -> N
     with pytest.raises(EventError) as told:
         Event.from_json(text)
     assert complaint in str(told.value)
+
+
+def test_a_log_keeps_events_of_its_epoch_and_source_in_order() -> None:
+    log = EventLog(2300, 12.5, "station")
+    log.add(EventKind.INPUT, "rr1", "missing")
+    log.extend([EXAMPLE])
+    log.add(EventKind.EXCLUSION, "rr2/G05", "b_value", 1, 2)
+    first, second, third = log.all()
+    assert (first.gps_week, first.tow_s, first.source, first.cause) == (2300, 12.5, "station", "missing")
+    assert math.isnan(first.value)
+    assert math.isnan(first.threshold)
+    assert second is EXAMPLE
+    assert (type(third.value), third.value, third.threshold) == (float, 1.0, 2.0)

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gbas_core.gnss.epoch_order import RESTART_AFTER_REFUSED
 from gbas_core.gnss.gpstime import epoch_key, from_epoch_key
 from gbas_msgs_py.joining import (
     MAX_WAITING_BURSTS,
-    RESTART_AFTER_LATE,
     AirborneJoiner,
     BurstQueue,
     EpochJoiner,
@@ -318,7 +318,7 @@ def test_one_epoch_from_the_future_does_not_end_the_ground() -> None:
     given = []
     for key in (START, START + 500 + DAY_MS, *range(START + 1000, START + 20_000, 500)):
         given += [joined.key for source in ("rr1", "rr2") for joined in joiner.add(source, key, "x", 0.0)]
-    resumed = START + 1000 + 500 * (RESTART_AFTER_LATE - 1)
+    resumed = START + 1000 + 500 * (RESTART_AFTER_REFUSED - 1)
     assert given == [START, START + 500 + DAY_MS, *range(resumed, START + 20_000, 500)]
 
 
@@ -330,7 +330,7 @@ def test_one_epoch_from_the_future_does_not_end_the_aircraft() -> None:
         given += joiner.add_burst(burst(key))
     assert [each.key for each in given[:2]] == [START, START + 500 + DAY_MS]
     assert given[-1].key == START + 19_500
-    assert len(given) >= 2 + 37 - RESTART_AFTER_LATE  # what was late while the time was still in doubt is lost
+    assert len(given) >= 2 + 37 - RESTART_AFTER_REFUSED  # what was late while the time was still in doubt is lost
     # the frame of its own epoch is waited for as before
     assert all([epoch_key(b.gps_week, b.tow_s) for b in each.bursts] == [each.key] for each in given[-20:])
 

@@ -13,7 +13,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy import integrate
 
-from gbas_airborne.receiver import AirborneEpoch, AirborneReceiver, AirborneState
+from gbas_airborne.receiver import AirborneReceiver, AirborneState
+from gbas_airborne.reception.receive import AirborneEpoch
 from gbas_core.gnss.ephemeris import Ephemeris, NavigationMessage
 from gbas_core.gnss.frames import azimuth_elevation, ecef_from_geodetic, geodetic_from_ecef, rot_enu_ecef
 from gbas_core.gnss.gpstime import modified_z_count_s, normalised
@@ -380,11 +381,11 @@ class Flight:
 
     def step(self, t: float, **changes: object) -> tuple:
         epoch = changes.pop("epoch", None) or self.world.epoch(t, **changes)
-        self.state, solution, protection, events = AirborneReceiver.step(self.state, epoch, self.params)
-        self.solutions.append(solution)
-        self.protections.append(protection)
-        self.events.extend(events)
-        return solution, protection, events
+        self.state, output = AirborneReceiver.step(self.state, epoch, self.params)
+        self.solutions.append(output.solutions[0])
+        self.protections.append(output.protections[0])
+        self.events.extend(output.events)
+        return output.solutions[0], output.protections[0], output.events
 
     def run(self, start: float, stop: float, *, interval_s: float = 0.5) -> tuple:
         result = ()

@@ -21,7 +21,7 @@ from gbas_core.satellites import satellites_of
 from gbas_core.signals import L1, SPEED_OF_LIGHT_MPS
 from gbas_ground.channels import ephemerides
 from gbas_ground.channels.predicted_ranges import predict_ranges, site_of
-from gbas_ground.channels.tracking import TrackGroup, initial_tracking, stack, track
+from gbas_ground.channels.tracking import TrackGroup, filter_params, initial_tracking, stack, track
 from gbas_ground.monitors.ionosphere_gradient import IonosphereGradientParams
 from gbas_ground.params import GroundParams
 from gbas_msgs_py.joining import ReceptionQueue
@@ -62,8 +62,8 @@ def station_of(positions_m: FloatArray, systems: str) -> GroundParams:
     """A station with its reference point at the first receiver."""
     latitude, longitude, height = (float(value) for value in geodetic_from_ecef(np.array(positions_m[0])))
     return made_of(GroundParams, {
-        "station.id": "TEST", "station.latitude_rad": latitude, "station.longitude_rad": longitude,
-        "station.height_m": height, "station.systems": systems, "station.gcid": 1,
+        "station.id": "TEST", "station.station.latitude_rad": latitude, "station.station.longitude_rad": longitude,
+        "station.station.height_m": height, "station.station.systems": systems, "station.station.gcid": 1,
         **receiver_values(np.array(positions_m)), "receivers.minimum": 1, "signal_power.require_cn0": False,
         "vdb.slots": "AB", "ephemeris.settle_s": 0.0,
     })  # fmt: skip
@@ -85,7 +85,8 @@ def monitor_epochs(
 ) -> Iterator[MonitorEpoch]:
     """Epochs as the station sees them: key, observations, ephemerides received since the epoch before."""
     site, known = site_of(params), ephemerides.initial_ephemerides()
-    groups: tuple[TrackGroup, ...] = initial_tracking(params)
+    filters = filter_params(params)
+    groups: tuple[TrackGroup, ...] = initial_tracking(filters, params.n_receivers)
     for key, observations, received in observed:
         week, tow_s = from_epoch_key(key)
         before = known.current
@@ -98,14 +99,14 @@ def monitor_epochs(
         old = predict_ranges(before, week, tow_s, raw.code_m[:, L1], site)
         shift = np.where(changed, old.range_m - SPEED_OF_LIGHT_MPS * old.clock_s - less_clock, 0.0)
         less_clock = np.where(changed, np.nan, less_clock)
-        groups, tracks = track(groups, raw, key, less_clock, params)
+        groups, tracks = track(groups, raw, key, less_clock, filters)
         _, los = rotated_range(
             site.positions_m[-1], predicted_state(known.current, week, tow_s, site.positions_m[-1]).position_m
         )
         azimuths, _ = azimuth_elevation(rot_enu_ecef(params.station.latitude_rad, params.station.longitude_rad) @ los)
         yield MonitorEpoch(
             key, raw.code_m, raw.carrier_m, raw.cn0_dbhz,
-            np.repeat((tracks.age_s == 0.0)[:, np.newaxis], raw.code_m.shape[1], axis=1),
+            np.repeat((tracks.age_of(L1) == 0.0)[:, np.newaxis], raw.code_m.shape[1], axis=1),
             predicted.range_m, predicted.clock_s, predicted.elevation_rad, azimuths, shift,
         )  # fmt: skip
 

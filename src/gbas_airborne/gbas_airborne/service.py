@@ -15,19 +15,18 @@ import math
 from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
+from gbas_airborne.modes import configured_modes, subject_prefix
 from gbas_airborne.navigation.guidance import alert_limits_m
 from gbas_airborne.params import NO_FAS, AirborneParams
 from gbas_airborne.protection.levels import NOT_PROTECTED, Multipliers, ProtectionLevels, protection_levels
-from gbas_airborne.reception.vdb_messages import HEALTHY_GCID
+from gbas_airborne.reception.station_data import HEALTHY_GCID
 from gbas_core.positioning.approach import APD_C, APD_CD
 from gbas_msgs_py.codes import ApproachState, EventKind, ServiceType
-from gbas_msgs_py.events import Event
-from gbas_msgs_py.modes import MODES
+from gbas_msgs_py.events import Event, EventLog
 from gbas_msgs_py.records import ProtectionEpoch, SolutionEpoch
 
 SERVICE_C_APD: Final = (float(APD_C), float(APD_CD))
 SOURCE: Final = "protection_level"
-_SERVICE_C_MODES: Final = tuple(float(mode.number) for mode in MODES if mode.service is ServiceType.C)
 
 
 class Failure(NamedTuple):
@@ -99,7 +98,7 @@ def service_step(
         lal_m=lal_m,
         state=float(new.state),
     )
-    return new, protection, _events(state, new, solution, failure)
+    return new, protection, _events(state, new, solution, failure, subject_prefix(solution.mode, params))
 
 
 def _message_failure(solution: SolutionEpoch, params: AirborneParams) -> Failure | None:
@@ -137,7 +136,7 @@ def _position_failure(solution: SolutionEpoch, params: AirborneParams) -> Failur
         return Failure(valid, "correction_age", solution.correction_age_s, params.correction_timeout_s)
     if not math.isfinite(solution.x_m + solution.y_m + solution.z_m):
         return Failure(valid, "no_position", solution.n_sats, math.nan)
-    if solution.mode not in _SERVICE_C_MODES:
+    if solution.mode not in [mode.number for mode in configured_modes(params)]:
         return Failure(valid, "mode_without_service", solution.mode, math.nan)
     if params.require_ephemeris_bound and not solution.k_md_e > 0.0:
         return Failure(valid, "no_ephemeris_bound", solution.k_md_e, math.nan)
@@ -177,32 +176,19 @@ def _next_state(state: ServiceState, solution: SolutionEpoch, failure: Failure |
 
 
 def _events(
-    old: ServiceState, new: ServiceState, solution: SolutionEpoch, failure: Failure | None
+    old: ServiceState, new: ServiceState, solution: SolutionEpoch, failure: Failure | None, prefix: str
 ) -> tuple[Event, ...]:
     if (old.state, old.service, old.cause) == (new.state, new.service, new.cause):
         return ()
     found = failure or Failure(new.state, "protected", math.nan, math.nan)
-
-    def event(kind: EventKind, subject: str, cause: str, value: float, threshold: float = math.nan) -> Event:
-        return Event(
-            gps_week=solution.gps_week,
-            tow_s=solution.tow_s,
-            kind=kind,
-            subject=subject,
-            cause=cause,
-            value=value,
-            threshold=threshold,
-            source=SOURCE,
-        )
-
-    events = []
+    events = EventLog(solution.gps_week, solution.tow_s, SOURCE)
     if new.cause != old.cause:
         if failure is None:
-            events.append(event(EventKind.ALERT, "navigation", "cleared", 0.0))
+            events.add(EventKind.ALERT, prefix + "navigation", "cleared", 0.0)
         else:
-            events.append(event(EventKind.ALERT, "navigation", found.cause, found.value, found.threshold))
+            events.add(EventKind.ALERT, prefix + "navigation", found.cause, found.value, found.threshold)
     if new.service != old.service:
-        events.append(event(EventKind.SERVICE, "service", found.cause, float(new.service)))
+        events.add(EventKind.SERVICE, prefix + "service", found.cause, float(new.service))
     if new.state != old.state:
-        events.append(event(EventKind.SERVICE, "approach_state", new.state.name.lower(), float(new.state)))
-    return tuple(events)
+        events.add(EventKind.SERVICE, prefix + "approach_state", new.state.name.lower(), float(new.state))
+    return events.all()

@@ -11,7 +11,8 @@ from typing import Any, Final, TypeVar
 import yaml
 
 from gbas_airborne.params import AirborneParams
-from gbas_airborne.receiver import AirborneEpoch, AirborneReceiver, PositionState
+from gbas_airborne.receiver import AirborneReceiver, PositionState
+from gbas_airborne.reception.receive import AirborneEpoch
 from gbas_airborne.service import ServiceState
 from gbas_bench.figures import Figure, Part
 from gbas_bench.world import bench_config, bench_world
@@ -160,7 +161,9 @@ def _step_through(flight: Flight, clock: _Clock) -> None:
         heard = AirborneEpoch(
             gps_week=week, tow_s=tow_s, observations=epoch.user, bursts=bursts, ephemerides=ephemerides
         )
-        position, solution, _ = clock.time("position", AirborneReceiver.position, position, heard, flight.airborne)
+        position, (solution, *_), _ = clock.time(
+            "position", AirborneReceiver.position, position, heard, flight.airborne
+        )
         service, protection, _ = clock.time("protect", AirborneReceiver.protect, service, solution, flight.airborne)
         clock.time("vdb decode", lambda bursts=bursts: [decode_burst(burst) for burst in bursts])
         _convert(clock, epoch, monitored, solution, protection)

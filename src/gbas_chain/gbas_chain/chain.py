@@ -10,7 +10,8 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 from gbas_airborne.params import AirborneParams
-from gbas_airborne.receiver import AirborneEpoch, AirborneReceiver, AirborneState
+from gbas_airborne.receiver import AirborneReceiver, AirborneState
+from gbas_airborne.reception.receive import AirborneEpoch
 from gbas_core.gnss.ephemeris import Ephemeris
 from gbas_core.gnss.gpstime import epoch_key, from_epoch_key
 from gbas_core.gnss.observations import ObservationEpoch
@@ -47,11 +48,21 @@ class GroundOutput:
 
 @dataclass(frozen=True, kw_only=True)
 class AirborneOutput:
-    """What the aircraft made of one epoch."""
+    """What the aircraft made of one epoch.
+
+    Attributes
+    ----------
+    solution, protection
+        Of the mode that guidance is from.
+    events : tuple of Event
+    others : tuple of (SolutionEpoch, ProtectionEpoch)
+        Of the modes beside it.
+    """
 
     solution: SolutionEpoch
     protection: ProtectionEpoch
     events: tuple[Event, ...]
+    others: tuple[tuple[SolutionEpoch, ProtectionEpoch], ...] = ()
 
 
 class Chain:
@@ -121,7 +132,7 @@ class Chain:
     def airborne_step(self, joined: AirborneInput[ObservationEpoch]) -> AirborneOutput:
         """Step the aircraft alone."""
         week, tow_s = from_epoch_key(joined.key)
-        self._airborne_state, solution, protection, events = AirborneReceiver.step(
+        self._airborne_state, output = AirborneReceiver.step(
             self._airborne_state,
             AirborneEpoch(
                 gps_week=week,
@@ -132,7 +143,8 @@ class Chain:
             ),
             self._airborne_params,
         )
-        return AirborneOutput(solution=solution, protection=protection, events=events)
+        first, *others = zip(output.solutions, output.protections, strict=True)
+        return AirborneOutput(solution=first[0], protection=first[1], events=output.events, others=tuple(others))
 
 
 def _queue(ephemerides: Iterable[Ephemeris]) -> ReceptionQueue[Ephemeris]:

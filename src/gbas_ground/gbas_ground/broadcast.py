@@ -13,6 +13,7 @@ from typing import Final
 
 import numpy as np
 
+from gbas_core.gnss.epoch_order import Arrival, EpochOrder
 from gbas_core.gnss.gpstime import epoch_key
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import IS_GALILEO, RANGING_SOURCE_ID
@@ -47,8 +48,6 @@ _WITH_B_VALUES: Final = frozenset(
 """Types of messages that carry B values."""
 _MAX_CRC: Final = 0xFFFF
 _MAX_IOD: Final = np.where(IS_GALILEO, 1023, 255)  # Known: IODnav has 10 bits, IODE 8
-RESTART_AFTER_REFUSED: Final = 10
-"""Epochs refused, each later than the one before, after which the station believes them and starts anew. Ours."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -58,21 +57,12 @@ class BroadcastState:
     Attributes
     ----------
     schedule : ScheduleState
-    key : int or None
-        Epoch of the last frame [ms since the start of GPS time].
-    refused, refused_key : int
-        Epochs refused in a row because they were not later than that, and the last of them.
+    order : EpochOrder
+        Of the frames.
     """
 
     schedule: ScheduleState = field(default_factory=ScheduleState)
-    key: int | None = None
-    refused: int = 0
-    refused_key: int = 0
-
-
-def refused_in_a_row(refused: int, refused_key: int, key: int) -> int:
-    """How many epochs were refused in a row with this one, of which each is later than the one before."""
-    return refused + 1 if refused > 0 and key > refused_key else 1
+    order: EpochOrder = field(default_factory=EpochOrder)
 
 
 def empty_integrity(gps_week: int, tow_s: float) -> IntegrityEpoch:
@@ -121,10 +111,9 @@ def broadcast_frame(
     key = epoch_key(integrity.gps_week, integrity.tow_s)
     if key % _FRAME_MS:
         return state, ()
-    if state.key is not None and key <= state.key:
-        refused = refused_in_a_row(state.refused, state.refused_key, key)
-        if refused < RESTART_AFTER_REFUSED:
-            return replace(state, refused=refused, refused_key=key), ()
+    order, arrival = state.order.step(key)
+    if arrival is Arrival.REFUSED:
+        return replace(state, order=order), ()
     station, approaches, schedule, room = _constants(params)
     usable = broadcastable(integrity, params)
     sigma_vig = integrity.sigma_vert_iono_gradient
@@ -142,7 +131,7 @@ def broadcast_frame(
         approaches=approaches,
     )
     scheduled, bursts = schedule_frame(state.schedule, frame, schedule)
-    return BroadcastState(schedule=scheduled, key=key), bursts
+    return BroadcastState(schedule=scheduled, order=order), bursts
 
 
 def highest_sent(usable: BoolArray, elevation_rad: FloatArray, params: GroundParams) -> BoolArray:

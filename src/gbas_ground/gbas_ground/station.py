@@ -10,23 +10,25 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from gbas_core.gnss.ephemeris import Ephemeris
+from gbas_core.gnss.epoch_order import Arrival, EpochOrder
 from gbas_core.gnss.gpstime import epoch_key, seconds_between
 from gbas_core.gnss.observations import ObservationEpoch
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import N_SATS, SAT_IDS, satellites_of
 from gbas_core.signals import L1, SPEED_OF_LIGHT_MPS
-from gbas_ground.broadcast import (
-    RESTART_AFTER_REFUSED,
-    BroadcastState,
-    broadcast_frame,
-    empty_integrity,
-    highest_sent,
-    refused_in_a_row,
-)
+from gbas_ground.broadcast import BroadcastState, broadcast_frame, empty_integrity, highest_sent
 from gbas_ground.channels import ephemerides
 from gbas_ground.channels.ephemerides import EphemerisState, initial_ephemerides
 from gbas_ground.channels.predicted_ranges import PredictedRanges, Site, predict_ranges, site_of
-from gbas_ground.channels.tracking import RawEpoch, TrackGroup, Tracks, initial_tracking, stack, track
+from gbas_ground.channels.tracking import (
+    RawEpoch,
+    TrackGroup,
+    Tracks,
+    filter_params,
+    initial_tracking,
+    stack,
+    track,
+)
 from gbas_ground.consistency import (
     CorrectionInputs,
     Corrections,
@@ -40,7 +42,6 @@ from gbas_ground.consistency import (
 from gbas_ground.corrections.formation import range_correction_m
 from gbas_ground.exclusions import advance, exclude, release
 from gbas_ground.executive.channel_table import channel_epoch
-from gbas_ground.executive.event_log import EventLog
 from gbas_ground.executive.satellite_status import SatelliteStatus, integrity_of, satellite_status, withheld
 from gbas_ground.ionosphere.position_errors import compile_ahead
 from gbas_ground.ionosphere.protection import (
@@ -60,11 +61,12 @@ from gbas_ground.monitors.sigma_monitor import SigmaMonitorState
 from gbas_ground.monitors.signal_power import check_signal_power
 from gbas_ground.params import GroundParams
 from gbas_msgs_py.codes import ChannelState, EventKind, ExclusionCause
-from gbas_msgs_py.events import Event
+from gbas_msgs_py.events import Event, EventLog
 from gbas_msgs_py.monitors import EXPECTED_RANGE, SIGNAL_POWER, TESTS
 from gbas_msgs_py.records import ChannelEpoch, IntegrityEpoch, MonitorDetailEpoch, MonitorEpoch
 from gbas_vdb.transmission.burst import Burst
 
+SOURCE: Final = "ground_station"
 _Checks = Sequence[tuple[ExclusionCause, MonitorResult]]
 _CHECKS: Final = (EXPECTED_RANGE.key("residual"), SIGNAL_POWER.key("cn0"))
 """Tests of single channels, in their order."""
@@ -141,10 +143,8 @@ class IntegrityState:
 
     Attributes
     ----------
-    key : int or None
-        Last epoch processed [ms since the start of GPS time].
-    refused, refused_key : int
-        Epochs refused in a row, and the last of them.
+    order : EpochOrder
+        Last epoch processed, and those refused since.
     ephemerides : EphemerisState
     tracking : tuple of TrackGroup
     exclusions : Exclusions
@@ -169,9 +169,7 @@ class IntegrityState:
         Protection against ionospheric fronts.
     """
 
-    key: int | None
-    refused: int
-    refused_key: int
+    order: EpochOrder
     ephemerides: EphemerisState
     tracking: tuple[TrackGroup, ...]
     exclusions: Exclusions
@@ -192,11 +190,9 @@ def initial_monitor_state(params: GroundParams) -> IntegrityState:
     if params.ionosphere.protects:
         compile_ahead()
     return IntegrityState(
-        key=None,
-        refused=0,
-        refused_key=0,
+        order=EpochOrder(),
         ephemerides=initial_ephemerides(),
-        tracking=initial_tracking(params),
+        tracking=initial_tracking(filter_params(params), params.n_receivers),
         exclusions=no_exclusions(params),
         previous=None,
         satellites=np.full(N_SATS, float(ChannelState.NOT_TRACKED)),
@@ -279,12 +275,11 @@ class GroundStation:
 
 
 def _monitor(state: IntegrityState, epoch: GroundEpoch, params: GroundParams) -> tuple[IntegrityState, Monitored]:
-    events = EventLog(epoch.gps_week, epoch.tow_s)
-    admitted = _admit(state, epoch, params, events)
-    if admitted is None:
-        refused = replace(state, refused=_refused(state, epoch), refused_key=epoch_key(epoch.gps_week, epoch.tow_s))
+    events = EventLog(epoch.gps_week, epoch.tow_s, SOURCE)
+    admitted, arrival = _admit(state, epoch, params, events)
+    if arrival is Arrival.REFUSED:
         week, tow_s = epoch.gps_week, epoch.tow_s
-        return refused, Monitored(
+        return admitted, Monitored(
             integrity=empty_integrity(week, tow_s),
             statistics=MonitorEpoch(gps_week=week, tow_s=tow_s),
             details=MonitorDetailEpoch(gps_week=week, tow_s=tow_s),
@@ -294,28 +289,27 @@ def _monitor(state: IntegrityState, epoch: GroundEpoch, params: GroundParams) ->
     return _process(admitted, epoch, params, events)
 
 
-def _refused(state: IntegrityState, epoch: GroundEpoch) -> int:
-    return refused_in_a_row(state.refused, state.refused_key, epoch_key(epoch.gps_week, epoch.tow_s))
-
-
-def _admit(state: IntegrityState, epoch: GroundEpoch, params: GroundParams, events: EventLog) -> IntegrityState | None:
-    """The state to continue from; None refuses the epoch."""
+def _admit(
+    state: IntegrityState, epoch: GroundEpoch, params: GroundParams, events: EventLog
+) -> tuple[IntegrityState, Arrival]:
+    """The state to continue from, and whether the epoch is taken."""
     key = epoch_key(epoch.gps_week, epoch.tow_s)
-    if state.key is None or key > state.key:
-        return replace(state, refused=0)
-    if _refused(state, epoch) >= RESTART_AFTER_REFUSED:
-        events.add(EventKind.STATION, "station", "restarted", (key - state.key) / 1000.0)
+    order, arrival = state.order.step(key)
+    if arrival is Arrival.REFUSED:
+        events.add(EventKind.INPUT, "station", "epoch_not_later", state.order.since_last_s(key), 0.0)
+        return replace(state, order=order), arrival
+    if arrival is Arrival.RESTART:
+        events.add(EventKind.STATION, "station", "restarted", state.order.since_last_s(key))
         # what was received stays true; it is not sent again
-        return replace(initial_monitor_state(params), ephemerides=state.ephemerides)
-    events.add(EventKind.INPUT, "station", "epoch_not_later", (key - state.key) / 1000.0, 0.0)
-    return None
+        return replace(initial_monitor_state(params), ephemerides=state.ephemerides), arrival
+    return state, arrival
 
 
 def _process(
     state: IntegrityState, epoch: GroundEpoch, params: GroundParams, events: EventLog
 ) -> tuple[IntegrityState, Monitored]:
     key = epoch_key(epoch.gps_week, epoch.tow_s)
-    dt_s = float("nan") if state.key is None else (key - state.key) / 1000.0
+    dt_s = state.order.since_last_s(key)
     _, satellites = _constants(params)
     known, changed = _ephemerides(state, epoch, params, events)
     raw = stack(_of_this_epoch(epoch, events), satellites)
@@ -325,7 +319,8 @@ def _process(
     observed, exclusions = _track_channels(state, epoch, raw, known, changed, exclusions, params, events)
     judged = _judge(state, epoch, observed, known, changed, exclusions, dt_s, params, events)
     inputs, corrections = judged.correction_inputs, judged.corrections
-    events.found(judged.findings)
+    for each in judged.findings:
+        events.add(EventKind.EXCLUSION, each.subject, each.cause.word, each.value, each.threshold)
     status = satellite_status(observed.tracked, observed.tracks, known, inputs, corrections, judged.exclusions, params)
     ionosphere, protection, status = _protect(state, key, status, corrections, observed.predicted, params, events)
     time, bound = (epoch.gps_week, epoch.tow_s), judged.monitor_output.orbit_bound
@@ -338,9 +333,7 @@ def _process(
     _contribution_events(state, contributing, raw, judged.exclusions, events)
     _satellite_events(state, status, serving, judged.findings, events)
     new = IntegrityState(
-        key=key,
-        refused=0,
-        refused_key=0,
+        order=EpochOrder(last_ms=key),
         ephemerides=known,
         tracking=observed.tracking,
         exclusions=judged.exclusions,
@@ -484,8 +477,9 @@ def _track_channels(
     )
     clean = _without(raw, checks[0][1].failed)
     key = epoch_key(epoch.gps_week, epoch.tow_s)
-    tracking, tracks = track(state.tracking, clean, key, _comparable_range_m(predicted, changed), params)
-    correction_m = range_correction_m(predicted.range_m, tracks.smoothed_m, predicted.clock_s)
+    comparable_m = _comparable_range_m(predicted, changed)
+    tracking, tracks = track(state.tracking, clean, key, comparable_m, filter_params(params))
+    correction_m = range_correction_m(predicted.range_m, tracks.smoothed_of(L1), predicted.clock_s)
     observed = _TrackedEpoch(
         raw=clean,
         predicted=predicted,
@@ -575,7 +569,7 @@ def _protect(
     events: EventLog,
 ) -> tuple[IonosphereState, Protection, SatelliteStatus]:
     """Protection of what would be sent against ionospheric fronts; what it cannot protect is not used."""
-    if state.key is None and not params.ionosphere.protects:
+    if state.order.last_ms is None and not params.ionosphere.protects:
         events.add(EventKind.STATION, "station", "ionosphere_no_threat_model")
     usable = status.state == ChannelState.USABLE
     sent = highest_sent(usable, predicted.elevation_rad, params) if params.ionosphere.protects else usable
@@ -594,7 +588,7 @@ def _previous_epoch(epoch: GroundEpoch, observed: _TrackedEpoch) -> PreviousEpoc
         gps_week=epoch.gps_week,
         tow_s=epoch.tow_s,
         code_m=observed.raw.code_m[:, L1],
-        smoothed_m=observed.tracks.smoothed_m,
+        smoothed_m=observed.tracks.smoothed_of(L1),
         correction_m=observed.correction_m,
     )
 
@@ -758,7 +752,7 @@ def _previous_corrections(
 def _settled(tracks: Tracks, correction_m: FloatArray, predicted: PredictedRanges, params: GroundParams) -> BoolArray:
     """Channels whose filters have run long enough, of satellites above the mask, ``(R, N)``."""
     high = predicted.elevation_rad >= params.monitors.elevation_mask_rad
-    return np.isfinite(correction_m).all(axis=0) & (tracks.age_s >= params.smoothing.settle_time_s) & high
+    return np.isfinite(correction_m).all(axis=0) & (tracks.age_of(L1) >= params.smoothing.settle_time_s) & high
 
 
 def _advanced(

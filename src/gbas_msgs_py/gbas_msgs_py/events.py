@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -99,6 +100,41 @@ class Event:
             threshold=_number_in(fields, "threshold"),
             source=_typed(fields, "source", str),
         )
+
+
+class EventLog:
+    """Events of one epoch from one source, collected in their order.
+
+    Parameters
+    ----------
+    gps_week, tow_s
+        The epoch.
+    source : str
+        Who says so, see :class:`Event`.
+    """
+
+    def __init__(self, gps_week: int, tow_s: float, source: str) -> None:
+        self._gps_week, self._tow_s, self._source = gps_week, tow_s, source
+        self._list: list[Event] = []
+
+    def add(
+        self, kind: EventKind, subject: str, cause: str, value: float = math.nan, threshold: float = math.nan
+    ) -> None:
+        """Note an event of this epoch."""
+        self._list.append(
+            Event(
+                gps_week=self._gps_week, tow_s=self._tow_s, kind=kind, subject=subject, cause=cause,
+                value=float(value), threshold=float(threshold), source=self._source,
+            )
+        )  # fmt: skip
+
+    def extend(self, events: Iterable[Event]) -> None:
+        """Take over events that are made already."""
+        self._list.extend(events)
+
+    def all(self) -> tuple[Event, ...]:
+        """The events so far."""
+        return tuple(self._list)
 
 
 def _number_out(value: float) -> float | str | None:

@@ -13,15 +13,13 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final, Generic, TypeVar
 
+from gbas_core.gnss.epoch_order import RefusedEpochs
 from gbas_core.gnss.gpstime import epoch_key
 from gbas_vdb.transmission.burst import Burst
 
 T = TypeVar("T")
 
 FRAME_MS: Final = 500
-RESTART_AFTER_LATE: Final = 10
-"""Epochs that come too late, each later than the one before and nothing in time between, after which they are the time
-now: what came before them had a wrong time."""
 MAX_WAITING_BURSTS: Final = 4096
 """Bursts kept while no observation comes (more than ten minutes of a full schedule); beyond it the oldest are lost."""
 
@@ -43,30 +41,6 @@ class JoinedEpoch(Generic[T]):
     key: int
     items: dict[str, T]
     timed_out: tuple[str, ...] = ()
-
-
-class LateEpochs:
-    """Tells a stream that goes on in the past from one that merely comes late.
-
-    One epoch with a time far ahead would otherwise make everything after it late for ever.
-    """
-
-    def __init__(self) -> None:
-        self._count = 0
-        self._last = 0
-
-    def in_time(self) -> None:
-        """Something was in time: the time is right."""
-        self._count = 0
-
-    def restarts(self, key: int) -> bool:
-        """Note a late epoch; whether time begins anew with it."""
-        if self._count == 0 or key < self._last:
-            self._count = 1
-        elif key > self._last:
-            self._count += 1
-        self._last = key
-        return self._count >= RESTART_AFTER_LATE
 
 
 class EpochJoiner(Generic[T]):
@@ -91,7 +65,7 @@ class EpochJoiner(Generic[T]):
         self._watermark: dict[str, int | None] = dict.fromkeys(sources)
         self._timeout_s = timeout_s
         self._pending: dict[int, tuple[float, dict[str, T]]] = {}
-        self._late = LateEpochs()
+        self._late = RefusedEpochs()
         self.last_key: int | None = None
         self.late = dict.fromkeys(sources, 0)
         self.duplicate = dict.fromkeys(sources, 0)
@@ -101,10 +75,11 @@ class EpochJoiner(Generic[T]):
         """Deliver an item; returns the epochs it completes, in order. `now_s` is a monotonic time."""
         if self.last_key is not None and key <= self.last_key:
             self.late[source] += 1
-            if not self._late.restarts(key):
+            self._late = self._late.then(key)
+            if not self._late.restart:
                 return []
             self._begin_anew()
-        self._late.in_time()
+        self._late = RefusedEpochs()
         _, items = self._pending.setdefault(key, (now_s, {}))
         if source in items:
             self.duplicate[source] += 1
@@ -293,7 +268,7 @@ class AirborneJoiner(Generic[T]):
         self._bursts = BurstQueue(correction_wait_s)
         self._timeout_s = timeout_s
         self._pending: list[tuple[int, float, T]] = []
-        self._late = LateEpochs()
+        self._late = RefusedEpochs()
         self.last_key: int | None = None
         self.late = 0
         self.duplicate = 0
@@ -321,11 +296,12 @@ class AirborneJoiner(Generic[T]):
         """Deliver an observation; returns what can be processed, in order."""
         if self.last_key is not None and key <= self.last_key:
             self.late += 1
-            if not self._late.restarts(key):
+            self._late = self._late.then(key)
+            if not self._late.restart:
                 return []
             self._pending, self.last_key = [], None
             self._bursts.begin_anew(key)
-        self._late.in_time()
+        self._late = RefusedEpochs()
         if any(key == pending for pending, _, _ in self._pending):
             self.duplicate += 1
         else:

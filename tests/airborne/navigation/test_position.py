@@ -22,7 +22,7 @@ from airborne_world import (
 )
 from gbas_airborne.params import AirborneParams
 from gbas_airborne.ranging.corrected_ranges import settling_factor
-from gbas_airborne.reception.vdb_messages import final_approach
+from gbas_airborne.reception.station_data import final_approach
 from gbas_core.gnss.frames import geodetic_from_ecef
 from gbas_core.satellites import IS_GPS, N_SATS
 from gbas_core.signals import SPEED_OF_LIGHT_MPS

@@ -10,7 +10,9 @@ import pytest
 
 from airborne_world import WEEK, Flight, World, burst_of, fas_data_set, station_data
 from gbas_airborne.params import AirborneParams
-from gbas_airborne.reception.vdb_messages import ReceptionState, reception_step
+from gbas_airborne.reception.station_data import Corrections
+from gbas_airborne.reception.vdb_messages import reception_step
+from gbas_airborne.reception.vdb_state import ReceptionState
 from gbas_core.gnss.gpstime import modified_z_count_s
 from gbas_core.satellites import SAT_INDEX, SOURCE_ID_INDEX
 from gbas_msgs_py.events import Event
@@ -46,6 +48,12 @@ def received(
     return reception_step(state or ReceptionState(), bursts, WEEK, tow_s, params)
 
 
+def received_corrections(state: ReceptionState) -> Corrections | None:
+    """Corrections of the only product type 1 messages carry."""
+    assert set(state.corrections) <= {"l1_100"}
+    return state.corrections.get("l1_100")
+
+
 def frame(*messages: object, tow_s: float = TOW_S, slot: int = 0, **how: object) -> Burst:
     return burst_of(messages, WEEK, tow_s, slot=slot, **how)
 
@@ -79,16 +87,16 @@ def test_a_multiplier_of_zero_is_no_multiplier() -> None:
 
 def test_corrections_land_on_the_satellite_axis() -> None:
     state, _ = received(frame(type1(5, 71)), state=selected())
-    assert state.corrections is not None
+    assert received_corrections(state) is not None
     for satellite in ("G05", "E01"):
         index = SAT_INDEX[satellite]
-        assert state.corrections.prc_m[index] == pytest.approx(1.25, abs=1e-12)
-        assert state.corrections.rrc_mps[index] == pytest.approx(-0.012, abs=1e-12)
-        assert state.corrections.sigma_m[index] == pytest.approx(0.3, abs=1e-12)
-        np.testing.assert_allclose(state.corrections.b_m[:, index], [0.1, -0.1, 0.0, np.nan], atol=1e-12)
-    assert np.isfinite(state.corrections.listed).sum() == 2
-    assert (state.corrections.gps_week, state.corrections.tow_s) == (WEEK, TOW_S)
-    assert state.type1_received == (WEEK, TOW_S)
+        assert received_corrections(state).prc_m[index] == pytest.approx(1.25, abs=1e-12)
+        assert received_corrections(state).rrc_mps[index] == pytest.approx(-0.012, abs=1e-12)
+        assert received_corrections(state).sigma_m[index] == pytest.approx(0.3, abs=1e-12)
+        np.testing.assert_allclose(received_corrections(state).b_m[:, index], [0.1, -0.1, 0.0, np.nan], atol=1e-12)
+    assert np.isfinite(received_corrections(state).listed).sum() == 2
+    assert (received_corrections(state).gps_week, received_corrections(state).tow_s) == (WEEK, TOW_S)
+    assert received_corrections(state).received == (WEEK, TOW_S)
 
 
 def test_first_measurement_carries_the_ephemeris_check() -> None:
@@ -102,33 +110,33 @@ def test_first_measurement_carries_the_ephemeris_check() -> None:
 def test_unknown_sources_are_left_out() -> None:
     """SBAS and GLONASS sources are not on the suite's axis."""
     state, _ = received(frame(type1(40, 5, 120)), state=selected())
-    assert state.corrections is not None
-    assert np.flatnonzero(np.isfinite(state.corrections.listed)).tolist() == [SOURCE_ID_INDEX[5]]
+    assert received_corrections(state) is not None
+    assert np.flatnonzero(np.isfinite(received_corrections(state).listed)).tolist() == [SOURCE_ID_INDEX[5]]
 
 
 def test_empty_type1_is_a_valid_message() -> None:
     state, _ = received(frame(type1()), state=selected())
-    assert state.type1_received == (WEEK, TOW_S)
-    assert state.corrections is not None
-    assert not np.isfinite(state.corrections.listed).any()
+    assert received_corrections(state).received == (WEEK, TOW_S)
+    assert received_corrections(state) is not None
+    assert not np.isfinite(received_corrections(state).listed).any()
 
 
 def test_a_satellite_missing_from_the_newest_message_is_gone() -> None:
     state, _ = received(frame(type1(5, 6)), state=selected())
     state, _ = received(frame(type1(6, tow_s=TOW_S + 0.5), tow_s=TOW_S + 0.5), state=state, tow_s=TOW_S + 0.5)
-    assert state.corrections is not None
-    assert np.flatnonzero(np.isfinite(state.corrections.listed)).tolist() == [SOURCE_ID_INDEX[6]]
+    assert received_corrections(state) is not None
+    assert np.flatnonzero(np.isfinite(received_corrections(state).listed)).tolist() == [SOURCE_ID_INDEX[6]]
 
 
 def test_nothing_is_used_before_station_data() -> None:
     state, _ = received(frame(type1(5)))
-    assert state.corrections is None
+    assert received_corrections(state) is None
     assert state.counts.unusable == 1
 
 
 def test_other_measurement_types_are_not_l1() -> None:
     state, _ = received(frame(replace(type1(5), measurement_type=1)), state=selected())
-    assert state.corrections is None
+    assert received_corrections(state) is None
     assert state.counts.unusable == 1
 
 
@@ -137,15 +145,14 @@ def test_other_measurement_types_are_not_l1() -> None:
 
 def test_linked_pair_is_used_when_both_are_there() -> None:
     state, _ = received(frame(type1(5, 6, flag=1)), frame(type1(7, 8, flag=3), slot=1), state=selected())
-    assert state.corrections is not None
-    assert np.isfinite(state.corrections.listed).sum() == 4
+    assert received_corrections(state) is not None
+    assert np.isfinite(received_corrections(state).listed).sum() == 4
     assert state.pending_pair is None
 
 
 def test_half_a_pair_is_not_used() -> None:
     state, _ = received(frame(type1(5, 6, flag=1)), state=selected())
-    assert state.corrections is None
-    assert state.type1_received is None
+    assert received_corrections(state) is None
 
 
 @pytest.mark.parametrize("flag", [1, 3])
@@ -153,13 +160,13 @@ def test_a_pair_of_different_z_counts_is_not_used(flag: int) -> None:
     state, _ = received(frame(type1(5, flag=flag)), state=selected())
     later = TOW_S + 0.5
     state, _ = received(frame(type1(7, flag=4 - flag, tow_s=later), tow_s=later), state=state, tow_s=later)
-    assert state.corrections is None
+    assert received_corrections(state) is None
     assert state.counts.unpaired == 1
 
 
 def test_two_first_halves_are_no_pair() -> None:
     state, _ = received(frame(type1(5, flag=1)), frame(type1(7, flag=1), slot=1), state=selected())
-    assert state.corrections is None
+    assert received_corrections(state) is None
     assert state.counts.unpaired == 1
 
 
@@ -168,14 +175,14 @@ def test_halves_of_a_pair_twenty_minutes_apart_are_no_pair() -> None:
     state, _ = received(frame(type1(5, flag=1)), state=selected())
     later_s = TOW_S + 1200.0
     state, _ = received(frame(type1(71, flag=3, tow_s=later_s), tow_s=later_s), state=state, tow_s=later_s)
-    assert state.corrections is None
+    assert received_corrections(state) is None
 
 
 def test_a_single_message_ends_the_wait_for_the_second() -> None:
     bursts = frame(type1(5, flag=1)), frame(type1(6), slot=1), frame(type1(7, flag=3), slot=2)
     state, _ = received(*bursts, state=selected())
-    assert state.corrections is not None
-    assert np.flatnonzero(np.isfinite(state.corrections.listed)).tolist() == [SOURCE_ID_INDEX[6]]
+    assert received_corrections(state) is not None
+    assert np.flatnonzero(np.isfinite(received_corrections(state).listed)).tolist() == [SOURCE_ID_INDEX[6]]
     assert state.counts.unpaired == 1
 
 
@@ -190,15 +197,15 @@ def test_z_count_is_resolved_to_the_frame() -> None:
         frame(type1(5, z_count_s=1199.5), tow_s=tow_s, slot=1),
         tow_s=tow_s,
     )
-    assert state.corrections is not None
-    assert (state.corrections.gps_week, state.corrections.tow_s) == (WEEK, 1199.5)
+    assert received_corrections(state) is not None
+    assert (received_corrections(state).gps_week, received_corrections(state).tow_s) == (WEEK, 1199.5)
 
 
 @pytest.mark.parametrize("offset_s", [0.5, 3.0, -10.5, -300.0, 500.0])
 def test_z_count_far_from_the_frame_is_refused(offset_s: float) -> None:
     z_count_s = modified_z_count_s(TOW_S + offset_s)
     state, events = received(frame(type1(5, z_count_s=z_count_s)), state=selected())
-    assert state.corrections is None
+    assert received_corrections(state) is None
     assert [event.cause for event in events] == ["z_count"]
     assert events[0].value == pytest.approx(-offset_s)
 
@@ -206,8 +213,8 @@ def test_z_count_far_from_the_frame_is_refused(offset_s: float) -> None:
 def test_older_corrections_do_not_replace_newer() -> None:
     state, _ = received(frame(type1(5)), state=selected())
     state, _ = received(frame(type1(6, tow_s=TOW_S - 1.0), tow_s=TOW_S - 1.0), state=state)
-    assert state.corrections is not None
-    assert state.corrections.tow_s == TOW_S
+    assert received_corrections(state) is not None
+    assert received_corrections(state).tow_s == TOW_S
 
 
 def test_a_burst_of_an_earlier_frame_comes_too_late() -> None:
@@ -228,7 +235,7 @@ def test_station_data_that_are_not_repeated_are_forgotten() -> None:
         state, events = received(frame(type1(5, tow_s=tow_s), tow_s=tow_s), state=state, tow_s=tow_s)
         assert (state.station is not None) == known
     assert [event.cause for event in events] == ["station_data_timeout"]
-    assert state.corrections is None
+    assert received_corrections(state) is None
 
 
 def test_an_approach_that_is_not_repeated_is_forgotten() -> None:
@@ -245,12 +252,12 @@ def test_an_approach_that_is_not_repeated_is_forgotten() -> None:
 
 def test_later_frames_wait_for_their_epoch() -> None:
     state, _ = received(frame(type1(5, tow_s=TOW_S + 1.0), tow_s=TOW_S + 1.0), state=selected())
-    assert state.corrections is None
+    assert received_corrections(state) is None
     assert len(state.waiting) == 1
     state, _ = received(state=state, tow_s=TOW_S + 0.5)
-    assert state.corrections is None
+    assert received_corrections(state) is None
     state, _ = received(state=state, tow_s=TOW_S + 1.0)
-    assert state.corrections is not None
+    assert received_corrections(state) is not None
     assert state.waiting == ()
 
 
@@ -258,7 +265,7 @@ def test_later_frames_wait_for_their_epoch() -> None:
 def test_wait_decides_which_frame_an_epoch_may_use(wait_s: float, taken: bool) -> None:
     params = AirborneParams(correction_wait_s=wait_s)
     state, _ = received(frame(station_data()), frame(type1(5), slot=1), params=params)
-    assert (state.corrections is not None) == taken
+    assert (received_corrections(state) is not None) == taken
 
 
 # --- whose messages
@@ -270,7 +277,7 @@ def test_another_station_is_not_listened_to_while_ours_speaks() -> None:
         frame(station_data(gcid=2), station_id="LFBO", slot=3), frame(type1(5), station_id="LFBO", slot=4), state=state
     )
     assert state.station_id == "EDVE"
-    assert state.corrections is None
+    assert received_corrections(state) is None
     assert state.counts.other_station == 2
 
 
@@ -283,7 +290,7 @@ def test_a_change_of_station_discards_everything() -> None:
     message = frame(station_data(rsds=9), tow_s=later, station_id="EDXX")
     state, events = received(message, state=state, tow_s=later, params=params)
     assert state.station_id == "EDXX"
-    assert state.corrections is None
+    assert received_corrections(state) is None
     assert state.approach is None
     assert not np.isfinite(state.checks.crc).any()
     assert [event.cause for event in events] == ["station_changed", "station_selected"]
@@ -293,7 +300,7 @@ def test_corrections_of_another_station_never_select_it() -> None:
     later = TOW_S + 60.0
     state, _ = received(frame(type1(5, tow_s=later), tow_s=later, station_id="EDXX"), state=selected(), tow_s=later)
     assert state.station_id == "EDVE"
-    assert state.corrections is None
+    assert received_corrections(state) is None
 
 
 def test_a_change_of_rsds_discards_everything() -> None:
@@ -301,7 +308,7 @@ def test_a_change_of_rsds_discards_everything() -> None:
     state, events = received(frame(station_data(rsds=4)), state=state)
     assert state.station is not None
     assert state.station.rsds == 4
-    assert state.corrections is None
+    assert received_corrections(state) is None
     assert events[0].cause == "rsds_changed"
     assert (events[0].value, events[0].threshold) == (4.0, 3.0)
 
@@ -328,7 +335,7 @@ def test_test_messages_end_guidance() -> None:
     state, _ = received(frame(type1(5)), state=selected())
     state, events = received(frame(type1(5), test=True), state=state)
     assert state.station is None
-    assert state.corrections is None
+    assert received_corrections(state) is None
     assert state.counts.test == 1
     assert [event.cause for event in events] == ["test_mode"]
 
@@ -350,7 +357,7 @@ def test_a_damaged_burst_is_discarded_and_counted() -> None:
     for place in (3, 20, 30, 41, 47):  # more than the three bytes the code repairs
         payload[place] ^= 0x5A
     state, events = received(replace(good, payload=bytes(payload)), state=selected())
-    assert state.corrections is None
+    assert received_corrections(state) is None
     assert state.counts.failed >= 1
     assert [event.cause for event in events] == ["block_discarded"]
 
@@ -361,7 +368,7 @@ def test_three_wrong_bytes_are_repaired() -> None:
     for place in (3, 20, 30):
         payload[place] ^= 0x5A
     state, _ = received(replace(good, payload=bytes(payload)), state=selected())
-    assert state.corrections is not None
+    assert received_corrections(state) is not None
     assert state.counts.corrected_bytes == 3
 
 
@@ -379,7 +386,7 @@ def test_three_wrong_bytes_are_repaired() -> None:
 )
 def test_nonsense_is_counted_and_forgotten(broken: dict[str, object]) -> None:
     state, _ = received(replace(frame(type1(5)), **broken), state=selected())
-    assert state.corrections is None
+    assert received_corrections(state) is None
     assert state.waiting == ()
     assert state.counts.failed >= 1
 
@@ -431,12 +438,12 @@ def test_unsuitable_approaches_are_refused(data_set: object, cause: str) -> None
 
 def test_slots_of_the_group_are_accepted() -> None:
     state, _ = received(frame(station_data(slot_group=0b11)), frame(type1(5), slot=1), params=AUTHENTIC)
-    assert state.corrections is not None
+    assert received_corrections(state) is not None
 
 
 def test_slots_outside_the_group_are_rejected() -> None:
     state, _ = received(frame(station_data(slot_group=0b11)), frame(type1(5), slot=2), params=AUTHENTIC)
-    assert state.corrections is None
+    assert received_corrections(state) is None
     assert state.counts.not_authentic == 1
 
 
@@ -462,7 +469,7 @@ def test_an_unexpected_group_is_rejected() -> None:
 
 def test_without_authentication_groups_do_not_matter() -> None:
     state, _ = received(frame(station_data(slot_group=0b11)), frame(type1(5), slot=5))
-    assert state.corrections is not None
+    assert received_corrections(state) is not None
 
 
 @pytest.mark.parametrize(("slot", "letter"), list(enumerate("AXZJCVPT")))
@@ -505,4 +512,4 @@ def test_more_satellites_than_one_message_holds() -> None:
     assert len(world.type1(0.0)) == 2
     flight = Flight(world, AirborneParams(settle_s=2.0, elevation_mask_deg=5.0))
     flight.run(0.0, 3.0)
-    assert np.isfinite(flight.state.position.reception.corrections.listed).sum() == 22
+    assert np.isfinite(flight.state.position.reception.vdb.corrections["l1_100"].listed).sum() == 22

@@ -11,6 +11,7 @@ import pytest
 from gbas_core.io.rinex import read_observations
 from gbas_core.ranging.slips import (
     NORMAL_MANOEUVRE_JERK_MPS3,
+    ChannelObservations,
     SlipCause,
     SlipParams,
     SlipState,
@@ -64,21 +65,19 @@ def made(n_epochs, dt_s, *, clock_m=None, motion_m=None, doppler=True, seed=1):
     )
 
 
+def observed(data, k, *, known=False, carrier=None):
+    """Observations of an epoch, with other carriers if they are given."""
+    carrier = data.carrier[k] if carrier is None else carrier
+    range_m = data.range[k] if known else None
+    return ChannelObservations(data.code[k], carrier, data.doppler[k], data.lli[k], range_m)
+
+
 def run(data, params, *, known=False, state=None, first=0):
     """Step through epochs; returns the causes (epochs, R, N_BANDS, N_SATS), the results and the last state."""
     state = initial_slips(data.code.shape[1]) if state is None else state
     results = []
     for k in range(first, len(data.code)):
-        state, result = slip_step(
-            state,
-            data.code[k],
-            data.carrier[k],
-            data.doppler[k],
-            data.lli[k],
-            np.nan if k == 0 else data.dt_s,
-            params,
-            range_m=data.range[k] if known else None,
-        )
+        state, result = slip_step(state, observed(data, k, known=known), np.nan if k == 0 else data.dt_s, params)
         results.append(result)
     return np.array([result.cause for result in results]), results, state
 
@@ -221,7 +220,7 @@ def test_an_interval_that_is_no_interval_flags_what_was_there(dt_s):
     _, _, state = run(data, GROUND)
     data.carrier[4, 0, :, G09] = np.nan
     missing = replace(state, carrier_m=np.where(np.arange(N_SATS) == E08, np.nan, state.carrier_m))
-    _, result = slip_step(missing, data.code[4], data.carrier[4], data.doppler[4], data.lli[4], dt_s, GROUND)
+    _, result = slip_step(missing, observed(data, 4), dt_s, GROUND)
     assert (result.cause[result.slipped] == SlipCause.GAP).all()
     there = set(SATELLITES) - {G09, E08}
     assert set(np.nonzero(result.slipped[0, L1])[0]) == there
@@ -304,6 +303,15 @@ def test_carriers_do_not_follow_what_is_no_whole_millisecond():
     np.testing.assert_array_equal(results[20].carrier_m, data.carrier[20])
 
 
+def test_carriers_do_not_follow_a_step_of_some_satellites():
+    """Four of ten codes step by a millisecond: each of these has slipped, and no clock has stepped."""
+    data, params = made(40, 1.0), SlipParams(follow_code_steps=True)
+    data.code[30:, :, :, SATELLITES[:4]] += MILLISECOND_M
+    causes, results, _ = run(data, params)
+    assert (results[30].clock_step_m == 0.0).all()
+    assert set(np.nonzero(causes[30].any(axis=(0, 1)))[0]) == set(SATELLITES[:4])
+
+
 def test_a_jump_of_one_code_restarts_that_satellite():
     data = made(40, 1.0)
     data.code[20:, 0, L1, G09] += 20.0
@@ -349,7 +357,7 @@ def test_steps_change_nothing_the_caller_holds():
     _, _, state = run(data, GROUND)
     held = {field.name: np.copy(getattr(state, field.name)) for field in fields(SlipState)}
     inputs = [np.copy(array[5]) for array in (data.code, data.carrier, data.doppler, data.lli)]
-    slip_step(state, data.code[5], data.carrier[5], data.doppler[5], data.lli[5], 1.0, GROUND)
+    slip_step(state, observed(data, 5), 1.0, GROUND)
     for name, value in held.items():
         np.testing.assert_array_equal(getattr(state, name), value)
     for array, value in zip((data.code, data.carrier, data.doppler, data.lli), inputs, strict=True):
@@ -411,9 +419,9 @@ def test_slips_put_into_a_recording_are_found(data_dir, name, doppler):
     rng, state, tried = np.random.default_rng(4), initial_slips(), 0
     kinds = [(1, 0, 0), (2, 0, 0), (5, 0, 0), (0, 0, 1), (9, 7, 0), (4, 0, 3)]
     for k in range(300):
-        arguments = data.doppler[k], data.lli[k], np.nan if k == 0 else 1.0, GROUND
+        arguments = np.nan if k == 0 else 1.0, GROUND
         before = state
-        state, clean = slip_step(before, data.code[k], data.carrier[k], *arguments)
+        state, clean = slip_step(before, observed(data, k), *arguments)
         cycles = np.array(kinds[k % len(kinds)])
         bands = np.nonzero(cycles)[0]
         usable = (np.isfinite(before.acceleration_mps2[0]) & np.isfinite(data.carrier[k, 0]) & ~clean.slipped[0])[bands]
@@ -422,7 +430,7 @@ def test_slips_put_into_a_recording_are_found(data_dir, name, doppler):
             continue
         satellite, slipped = rng.choice(choices), data.carrier[k].copy()
         slipped[0, :, satellite] += rng.choice([-1, 1]) * cycles * WAVELENGTH_M
-        _, result = slip_step(before, data.code[k], slipped, *arguments)
+        _, result = slip_step(before, observed(data, k, carrier=slipped), *arguments)
         assert result.slipped[0, bands, satellite].all(), (k, cycles, satellite)
         tried += 1
     assert tried > 150

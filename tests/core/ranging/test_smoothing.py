@@ -292,7 +292,7 @@ def test_geometry_passes_and_ambiguity_drops_out(geometry, ambiguity):
     ("changes", "message"),
     [
         ({"tau_s": ()}, "tau_s"),
-        ({"tau_s": (100.0, 0.0)}, "tau_s"),
+        ({"tau_s": (100.0, -1.0)}, "tau_s"),
         ({"tau_s": (np.nan,)}, "tau_s"),
         ({"start": "soft"}, "start"),
         ({"max_gap_s": 0.0}, "max_gap_s"),

@@ -7,7 +7,8 @@ from functools import partial
 from typing import Any
 
 from gbas_airborne.nodes.configuration import receiver_params
-from gbas_airborne.receiver import AirborneEpoch, AirborneReceiver, PositionState
+from gbas_airborne.receiver import AirborneReceiver, PositionState
+from gbas_airborne.reception.receive import AirborneEpoch
 from gbas_core.gnss.gpstime import epoch_key, from_epoch_key
 from gbas_core.gnss.observations import ObservationEpoch
 from gbas_msgs_py import tables, topics
@@ -60,8 +61,9 @@ class Positioning(GbasNode):
             bursts=joined.bursts,
             ephemerides=self.ephemerides.take(joined.key),
         )
-        self.state, solution, events = AirborneReceiver.position(self.state, epoch, self.receiver)
-        self.solution.publish(solution)
+        self.state, solutions, events = AirborneReceiver.position(self.state, epoch, self.receiver)
+        for solution in solutions:
+            self.solution.publish(solution)
         self.publish_events(events)
         self.finished_epoch(week, tow_s)
 

@@ -8,13 +8,14 @@ from typing import Any
 
 from sensor_msgs.msg import NavSatFix
 
+from gbas_airborne.modes import configured_modes
 from gbas_airborne.nodes.configuration import receiver_params
 from gbas_airborne.receiver import AirborneReceiver
 from gbas_airborne.service import ServiceState
 from gbas_msgs_py import tables, topics
 from gbas_msgs_py.codes import EventKind, ServiceType
 from gbas_msgs_py.events import Event
-from gbas_msgs_py.records import SolutionEpoch
+from gbas_msgs_py.records import ProtectionEpoch, SolutionEpoch
 from gbas_msgs_py.ros import fix_from_solution
 from gbas_node.node import ConfiguredParams, GbasNode, run
 
@@ -25,7 +26,8 @@ class ProtectionLevel(GbasNode):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("protection_level", ConfiguredParams, **kwargs)
         self.receiver = receiver_params(self, self.params.config)
-        self.state = ServiceState()
+        self.modes = tuple(mode.number for mode in configured_modes(self.receiver))
+        self.states = dict.fromkeys(self.modes, ServiceState())
         self.service_told = int(ServiceType.NONE)
         self.protection = self.table_publisher(topics.AIRBORNE_PROTECTION, tables.PROTECTION)
         self.service = self.uint8_publisher(topics.AIRBORNE_SERVICE)
@@ -42,8 +44,21 @@ class ProtectionLevel(GbasNode):
         self.when_ready(partial(self.step, solution))
 
     def step(self, solution: SolutionEpoch) -> None:
-        self.state, protection, events = AirborneReceiver.protect(self.state, solution, self.receiver)
+        """One solution: its protection levels, and the service if it is of the mode that guidance is from."""
+        if solution.mode not in self.modes:
+            self.problem("solution of a mode that is not configured")
+            return
+        mode = int(solution.mode)
+        self.states[mode], protection, events = AirborneReceiver.protect(self.states[mode], solution, self.receiver)
         self.protection.publish(protection)
+        if mode == self.modes[0]:
+            self.guide(solution, protection)
+        self.publish_events(events)
+        if mode == self.modes[-1]:
+            self.finished_epoch(solution.gps_week, solution.tow_s)
+
+    def guide(self, solution: SolutionEpoch, protection: ProtectionEpoch) -> None:
+        """Tell the service, and what is plotted beside it."""
         for name, publish in self.scalars.items():
             publish(getattr(protection, name))
         self.service_told = int(protection.service)
@@ -51,8 +66,6 @@ class ProtectionLevel(GbasNode):
         if self.fix.get_subscription_count():
             protected = math.isfinite(protection.vpl_m + protection.lpl_m)
             self.fix.publish(fix_from_solution(solution, protected=protected))
-        self.publish_events(events)
-        self.finished_epoch(solution.gps_week, solution.tow_s)
 
     def due(self, now_s: float) -> float:
         if self.service_told != ServiceType.NONE and self.silent_s(now_s) > self.params.silence_s:

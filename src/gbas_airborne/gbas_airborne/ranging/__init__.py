@@ -1,1 +1,1 @@
-"""Corrected ranges, and why the others are not used."""
+"""Own ranges, smoothed and corrected, and why the others are not used."""

@@ -9,7 +9,8 @@ Source: ICAO Annex 10 vol. I, App. B 3.6.5.2; RTCA DO-253 2.3.8.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Final
 
@@ -17,31 +18,59 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gbas_airborne.params import AirborneParams
-from gbas_airborne.reception.vdb_messages import Corrections, EphemerisChecks, StationData
-from gbas_core.gnss.ephemeris import Ephemeris
-from gbas_core.gnss.gpstime import seconds_between
+from gbas_airborne.ranging.own_ranges import Tracked
+from gbas_airborne.reception.receive import Received
+from gbas_airborne.reception.station_data import Corrections, EphemerisChecks
+from gbas_core.gnss.ephemeris import FIELDS, Ephemeris
 from gbas_core.gnss.orbits import transmit_place
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import missing, satellites_of
 from gbas_core.signals import SPEED_OF_LIGHT_MPS
 from gbas_msgs_py.codes import Rejection
+from gbas_msgs_py.modes import Mode
+from gbas_vdb.messages.ephemeris_crc import ephemeris_crcs
 
-MILLISECOND_M: Final = 1e-3 * SPEED_OF_LIGHT_MPS
-# Uncertain, ours: a common step of code against carrier counts as whole milliseconds when it is this close to them.
-_MILLISECOND_TOLERANCE_M: Final = 30.0
-_MIN_SATELLITES_FOR_STEP: Final = 3
 # The airborne sigma models are those of code smoothed over this time.
 _MODEL_TAU_S: Final = 100.0
 # A filter is never taken to be younger than one epoch of the VDB's rate.
 _YOUNGEST_S: Final = 0.5
 
 
+_Rule = tuple[Rejection, BoolArray]
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
-class RangingSources:
-    """Satellites an epoch offers, on the satellite axis; what needs no position.
+class OwnEphemerides:
+    """Own ephemerides with the issue of data of a product's corrections.
 
     Attributes
     ----------
+    ephemeris : Ephemeris
+    fields : (n_fields, N_SATS) array
+        All of them at once, to tell one from another.
+    crc : (N_SATS,) array
+        Their CRCs; NaN where there is none.
+    """
+
+    ephemeris: Ephemeris = field(default_factory=lambda: Ephemeris(gps_week=0, tow_s=0.0))
+    fields: FloatArray = field(default_factory=lambda: missing(len(FIELDS)))
+    crc: FloatArray = field(default_factory=missing)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CorrectState:
+    """Own ephemerides last matched with corrections, by product."""
+
+    matched: Mapping[str, OwnEphemerides] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RangingSources:
+    """Satellites an epoch offers to a mode, on the satellite axis; what needs no position.
+
+    Attributes
+    ----------
+    mode : Mode
     reason : (N_SATS,) int array
         :class:`Rejection`.
     range_m : (N_SATS,) array
@@ -58,6 +87,7 @@ class RangingSources:
         CRC of the ephemeris the receiver has for the correction; NaN where it has none.
     """
 
+    mode: Mode
     reason: NDArray[np.int64]
     range_m: FloatArray
     satellite_m: FloatArray
@@ -68,12 +98,11 @@ class RangingSources:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class SmoothedRanges:
-    """What the receiver measured: raw and smoothed L1 code and the age of the filters, (N_SATS,) arrays."""
+class Corrected:
+    """What was received, and the ranging sources of each mode."""
 
-    code_m: FloatArray
-    smoothed_m: FloatArray
-    settled_s: FloatArray
+    received: Received
+    sources: tuple[RangingSources, ...]
 
 
 def corrected_range_m(
@@ -110,55 +139,43 @@ def settling_factor(settled_s: FloatArray, tau_s: float) -> FloatArray:
     return result
 
 
-def millisecond_step_m(code_change_m: FloatArray, carrier_change_m: FloatArray) -> float:
-    """Whole milliseconds by which the code of all satellites stepped against the carrier [m]; 0 if they did not.
+def correct(
+    state: CorrectState, tracked: Tracked, modes: tuple[Mode, ...], params: AirborneParams
+) -> tuple[CorrectState, Corrected]:
+    """Third stage of an epoch: ranging sources of every mode.
 
-    Parameters
-    ----------
-    code_change_m, carrier_change_m : (N_SATS,) arrays
-        Changes since the last epoch [m], NaN where there is none.
-
-    Notes
-    -----
-    Some receivers step their clock by whole milliseconds and apply it to the code alone. Left alone it would look like
-    a slip on every satellite and restart every filter.
+    Ephemerides are those with the issue of data of the corrections; their CRCs are made once each.
     """
-    difference = code_change_m - carrier_change_m
-    stepped = np.abs(difference) > 0.5 * MILLISECOND_M
-    if np.count_nonzero(stepped) < _MIN_SATELLITES_FOR_STEP:
-        return 0.0
-    present = difference[np.isfinite(difference)]
-    step = float(np.round(np.median(present) / MILLISECOND_M) * MILLISECOND_M)
-    return step if (np.abs(present - step) < _MILLISECOND_TOLERANCE_M).all() else 0.0
+    received, matched = tracked.received, dict(state.matched)
+    for product in {mode.product: None for mode in modes}:
+        corrections = received.corrections.get(product)
+        iod = corrections.iod if corrections is not None else missing()
+        matched[product] = _match(matched.get(product, OwnEphemerides()), iod, received)
+    sources = tuple(ranging_sources(mode, tracked, matched[mode.product], params) for mode in modes)
+    return CorrectState(matched=matched), Corrected(received=received, sources=sources)
 
 
-def ranging_sources(
-    gps_week: int,
-    tow_s: float,
-    ranges: SmoothedRanges,
-    station: StationData | None,
-    corrections: Corrections | None,
-    ephemeris: Ephemeris,
-    ephemeris_crc: FloatArray,
-    checks: EphemerisChecks,
-    params: AirborneParams,
-) -> RangingSources:
-    """Corrected ranges of an epoch, and the reason where a satellite may not be used.
+def _match(before: OwnEphemerides, iod: FloatArray, received: Received) -> OwnEphemerides:
+    """Own ephemerides with an issue of data, and their CRCs; one that is as before has its CRC already."""
+    ephemeris = received.ephemerides.matching(iod, received.gps_week, received.tow_s)
+    fields = np.array([getattr(ephemeris, name) for name in FIELDS])
+    found = np.isfinite(ephemeris.iod)
+    fresh = found & ~((fields == before.fields) | (np.isnan(fields) & np.isnan(before.fields))).all(axis=0)
+    crc = np.where(found, before.crc, np.nan)
+    if fresh.any():
+        crc = np.where(fresh, ephemeris_crcs(ephemeris), crc)
+    return OwnEphemerides(ephemeris=ephemeris, fields=fields, crc=crc)
 
-    Parameters
-    ----------
-    gps_week, tow_s
-        Epoch of the observations.
-    ephemeris, ephemeris_crc
-        The receiver's own ephemerides with the issue of data of the corrections, and their CRCs (N_SATS,).
-    checks : EphemerisChecks
-        What the station said about ephemerides.
-    """
-    tracked = np.isfinite(ranges.smoothed_m)
+
+def ranging_sources(mode: Mode, tracked: Tracked, own: OwnEphemerides, params: AirborneParams) -> RangingSources:
+    """Corrected ranges of a mode, and the reason where a satellite may not be used."""
+    received, ranges = tracked.received, tracked.ranges(mode)
+    station, corrections = received.station, received.corrections.get(mode.product)
     if station is None or corrections is None or not (station.healthy or params.use_unhealthy):
-        reason = np.where(tracked, int(Rejection.NO_STATION), int(Rejection.NOT_TRACKED))
+        tracking = np.isfinite(ranges.smoothed_m)
         return RangingSources(
-            reason=reason,
+            mode=mode,
+            reason=np.where(tracking, int(Rejection.NO_STATION), int(Rejection.NOT_TRACKED)),
             range_m=missing(),
             satellite_m=missing(3),
             noise_factor=missing(),
@@ -166,50 +183,54 @@ def ranging_sources(
             age_s=math.nan,
             own_crc=missing(),
         )
-    age_s = seconds_between(corrections.gps_week, corrections.tow_s, gps_week, tow_s)
-    rules = _rules(ranges, station, corrections, age_s, ephemeris, ephemeris_crc, checks, params)
-    reason = first_reason(rules)
-    satellite = transmit_place(ephemeris, gps_week, tow_s, ranges.code_m)
-    factor = np.ones(tracked.shape)
+    age_s = received.since_s((corrections.gps_week, corrections.tow_s))
+    satellite = transmit_place(own.ephemeris, received.gps_week, received.tow_s, ranges.code_m)
+    factor = np.ones(ranges.smoothed_m.shape)
     if params.inflate_unsettled:
-        factor = settling_factor(ranges.settled_s, params.smoothing_tau_s)
+        factor = settling_factor(ranges.settled_s, mode.smoothing_s)
     return RangingSources(
-        reason=reason,
+        mode=mode,
+        reason=first_reason(
+            [
+                (Rejection.NOT_TRACKED, ~np.isfinite(ranges.smoothed_m)),
+                (Rejection.SYSTEM, ~_systems(params.systems)),
+                *_correction_rules(corrections, age_s, station.n_receivers, params),
+                *_ephemeris_rules(corrections, own, received.checks),
+                (Rejection.NOT_SETTLED, ~(ranges.settled_s >= params.settle_s)),
+            ]
+        ),
         range_m=corrected_range_m(ranges.smoothed_m, corrections, age_s, satellite.clock_s),
         satellite_m=satellite.position_m,
         noise_factor=factor,
         settled_s=ranges.settled_s,
         age_s=age_s,
-        own_crc=np.where(np.isfinite(ephemeris.iod), ephemeris_crc, np.nan),
+        own_crc=own.crc,
     )
 
 
-def _rules(
-    ranges: SmoothedRanges,
-    station: StationData,
-    corrections: Corrections,
-    age_s: float,
-    ephemeris: Ephemeris,
-    ephemeris_crc: FloatArray,
-    checks: EphemerisChecks,
-    params: AirborneParams,
-) -> list[tuple[Rejection, BoolArray]]:
-    """Each rule with the satellites it rejects. Comparisons are written so that NaN rejects."""
+# Each rule with the satellites it rejects. Comparisons are written so that NaN rejects.
+
+
+def _correction_rules(
+    corrections: Corrections, age_s: float, n_receivers: int, params: AirborneParams
+) -> tuple[_Rule, ...]:
     too_old = not -params.correction_timeout_s <= age_s <= params.correction_timeout_s
-    crc_told = checks.iod == corrections.iod
     valid = np.isfinite(corrections.prc_m + corrections.rrc_mps + corrections.sigma_m)
-    return [
-        (Rejection.NOT_TRACKED, ~np.isfinite(ranges.smoothed_m)),
-        (Rejection.SYSTEM, ~_systems(params.systems)),
+    return (
         (Rejection.NO_CORRECTION, ~np.isfinite(corrections.listed)),
         (Rejection.CORRECTION_INVALID, ~valid),
         (Rejection.CORRECTION_AGE, np.full(valid.shape, too_old)),
-        (Rejection.B_VALUES, ~usable_b_values(corrections.b_m, station.n_receivers, valid)),
-        (Rejection.EPHEMERIS_IOD, ~np.isfinite(ephemeris.iod)),
-        (Rejection.EPHEMERIS_CRC_MISSING, ~(crc_told & np.isfinite(checks.crc + checks.p))),
-        (Rejection.EPHEMERIS_CRC_MISMATCH, ~(ephemeris_crc == checks.crc)),
-        (Rejection.NOT_SETTLED, ~(ranges.settled_s >= params.settle_s)),
-    ]
+        (Rejection.B_VALUES, ~usable_b_values(corrections.b_m, n_receivers, valid)),
+    )
+
+
+def _ephemeris_rules(corrections: Corrections, own: OwnEphemerides, checks: EphemerisChecks) -> tuple[_Rule, ...]:
+    crc_known = (checks.iod == corrections.iod) & np.isfinite(checks.crc + checks.p)
+    return (
+        (Rejection.EPHEMERIS_IOD, ~np.isfinite(own.ephemeris.iod)),
+        (Rejection.EPHEMERIS_CRC_MISSING, ~crc_known),
+        (Rejection.EPHEMERIS_CRC_MISMATCH, ~(own.crc == checks.crc)),
+    )
 
 
 @lru_cache(maxsize=8)
@@ -232,7 +253,7 @@ def usable_b_values(b_m: FloatArray, n_receivers: int, valid: BoolArray) -> Bool
     return np.asarray(several | ((count == 0) & single_station))
 
 
-def first_reason(rules: list[tuple[Rejection, BoolArray]]) -> NDArray[np.int64]:
+def first_reason(rules: Sequence[_Rule]) -> NDArray[np.int64]:
     """The first rule that rejects each satellite; NONE where none does."""
     rejected = np.array([mask for _, mask in rules])
     numbers = np.array([int(rejection) for rejection, _ in rules])

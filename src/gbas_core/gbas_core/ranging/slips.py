@@ -170,6 +170,32 @@ class SlipResult:
     carrier_m: FloatArray
 
 
+class ChannelObservations(NamedTuple):
+    """Observations of several receivers at one epoch.
+
+    Attributes
+    ----------
+    code_m, carrier_m, doppler_hz, lli : (R, N_BANDS, N_SATS) arrays
+        As in :class:`gbas_core.gnss.observations.ObservationEpoch`; missing is NaN.
+    range_m : (R, N_SATS) array, optional
+        Geometric range minus satellite clock, where the receiver's position is known [m]; the rate test then needs no
+        history and stays sharp at long intervals. NaN for satellites without an ephemeris.
+    """
+
+    code_m: FloatArray
+    carrier_m: FloatArray
+    doppler_hz: FloatArray
+    lli: FloatArray
+    range_m: FloatArray | None = None
+
+    @property
+    def known_m(self) -> FloatArray:
+        """Known ranges (R, 1, N_SATS) [m], NaN where there are none."""
+        if self.range_m is None:
+            return np.full((len(self.code_m), 1, N_SATS), np.nan)
+        return self.range_m[:, np.newaxis, :]
+
+
 class _Epoch(NamedTuple):
     """Changes since the last epoch."""
 
@@ -197,15 +223,7 @@ def initial_slips(n_receivers: int = 1) -> SlipState:
 
 
 def slip_step(
-    state: SlipState,
-    code_m: FloatArray,
-    carrier_m: FloatArray,
-    doppler_hz: FloatArray,
-    lli: FloatArray,
-    dt_s: float,
-    params: SlipParams,
-    *,
-    range_m: FloatArray | None = None,
+    state: SlipState, observed: ChannelObservations, dt_s: float, params: SlipParams
 ) -> tuple[SlipState, SlipResult]:
     """Test one epoch of several receivers.
 
@@ -213,47 +231,44 @@ def slip_step(
     ----------
     state : SlipState
         From :func:`initial_slips` or the previous step.
-    code_m, carrier_m, doppler_hz, lli : (R, N_BANDS, N_SATS) arrays
-        As in :class:`gbas_core.gnss.observations.ObservationEpoch`; missing is NaN.
+    observed : ChannelObservations
     dt_s : float
         Time since the last epoch [s]; NaN for the first.
     params : SlipParams
-    range_m : (R, N_SATS) array, optional
-        Geometric range minus satellite clock, where the receiver's position is known [m]; the rate test then needs no
-        history and stays sharp at long intervals. NaN for satellites without an ephemeris.
 
     Returns
     -------
     state : SlipState
     result : SlipResult
     """
-    known_m = np.full((len(code_m), 1, N_SATS), np.nan) if range_m is None else range_m[:, np.newaxis, :]
-    carrier_m = carrier_m + state.followed_m[:, np.newaxis, np.newaxis]
-    cause, followed_m, clock_step_m = _lock_lost(lli), state.followed_m, np.zeros(len(code_m))
+    observed = observed._replace(carrier_m=observed.carrier_m + state.followed_m[:, np.newaxis, np.newaxis])
+    cause, followed_m, clock_step_m = _lock_lost(observed.lli), state.followed_m, np.zeros(len(observed.code_m))
     if 0.0 < dt_s <= params.max_gap_s:
-        epoch = _changes(state, code_m, carrier_m, doppler_hz, known_m, dt_s)
+        epoch = _changes(state, observed, dt_s)
         epoch, clock_step_m = _clock_step(epoch, params)
         if params.follow_code_steps and clock_step_m.any():
             step_m = _steps_to_follow(epoch, clock_step_m, params)
-            followed_m, carrier_m = followed_m + step_m, carrier_m + step_m[:, np.newaxis, np.newaxis]
-            epoch = epoch._replace(carrier_m=carrier_m - state.carrier_m)
+            followed_m = followed_m + step_m
+            observed = observed._replace(carrier_m=observed.carrier_m + step_m[:, np.newaxis, np.newaxis])
+            epoch = epoch._replace(carrier_m=observed.carrier_m - state.carrier_m)
         found, rate_mps = _tests(epoch, state, dt_s, params)
-        cause |= found | _frozen(state, code_m, carrier_m)
+        cause |= found | _frozen(state, observed.code_m, observed.carrier_m)
         rate_mps = np.where(cause == 0, rate_mps, np.nan)
     else:
-        cause |= _flag(np.isfinite(carrier_m - state.carrier_m), SlipCause.GAP)
-        rate_mps = np.full_like(carrier_m, np.nan)
+        cause |= _flag(np.isfinite(observed.carrier_m - state.carrier_m), SlipCause.GAP)
+        rate_mps = np.full_like(observed.carrier_m, np.nan)
     new = SlipState(
-        code_m=code_m,
-        carrier_m=carrier_m,
-        doppler_hz=doppler_hz,
+        code_m=observed.code_m,
+        carrier_m=observed.carrier_m,
+        doppler_hz=observed.doppler_hz,
         rate_mps=rate_mps,
         acceleration_mps2=(rate_mps - state.rate_mps) / (0.5 * (dt_s + state.dt_s)),
-        range_m=known_m,
+        range_m=observed.known_m,
         followed_m=followed_m,
         dt_s=dt_s,
     )
-    return new, SlipResult(slipped=cause != 0, cause=cause, clock_step_m=clock_step_m, carrier_m=carrier_m)
+    result = SlipResult(slipped=cause != 0, cause=cause, clock_step_m=clock_step_m, carrier_m=observed.carrier_m)
+    return new, result
 
 
 def _lock_lost(lli: FloatArray) -> CauseArray:
@@ -272,21 +287,14 @@ def _flag(found: BoolArray, cause: SlipCause) -> CauseArray:
     return found.astype(np.uint8) * np.uint8(cause)
 
 
-def _changes(
-    state: SlipState,
-    code_m: FloatArray,
-    carrier_m: FloatArray,
-    doppler_hz: FloatArray,
-    known_m: FloatArray,
-    dt_s: float,
-) -> _Epoch:
+def _changes(state: SlipState, observed: ChannelObservations, dt_s: float) -> _Epoch:
     return _Epoch(
-        carrier_m=carrier_m - state.carrier_m,
-        code_m=code_m - state.code_m,
-        doppler_mps=-0.5 * _LAMBDA_M * (doppler_hz + state.doppler_hz),
-        range_m=known_m - state.range_m,
+        carrier_m=observed.carrier_m - state.carrier_m,
+        code_m=observed.code_m - state.code_m,
+        doppler_mps=-0.5 * _LAMBDA_M * (observed.doppler_hz + state.doppler_hz),
+        range_m=observed.known_m - state.range_m,
         predicted_mps=state.rate_mps + state.acceleration_mps2 * (0.5 * (dt_s + state.dt_s)),
-        dt_s=np.full((len(code_m), 1, 1), dt_s),
+        dt_s=np.full((len(observed.code_m), 1, 1), dt_s),
     )
 
 

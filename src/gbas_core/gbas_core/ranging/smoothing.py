@@ -40,7 +40,8 @@ class SmoothingParams:
     Attributes
     ----------
     tau_s : tuple of float
-        Time constants; each is one entry of the leading axis of the smoothed range [s].
+        Time constants; each is one entry of the leading axis of the smoothed range [s]. 0 is no smoothing: the range
+        is the raw code, where there is a carrier.
     start : {"variable", "elapsed", "invariant"}
         Weight while the filter fills, see above. Only the invariant start is within 0.25 m of the settled filter 200 s
         after a restart at a divergence of 0.018 m/s (1.8 m / e^2 = 0.24 m); the variable one, with less noise, takes
@@ -55,8 +56,8 @@ class SmoothingParams:
     max_gap_s: float = 3.5
 
     def __post_init__(self) -> None:
-        if not self.tau_s or not all(np.isfinite(tau) and tau > 0.0 for tau in self.tau_s):
-            raise ValueError(f"tau_s is {self.tau_s}: every time constant must be above 0 s, and there must be one")
+        if not self.tau_s or not all(np.isfinite(tau) and tau >= 0.0 for tau in self.tau_s):
+            raise ValueError(f"tau_s is {self.tau_s}: every time constant must be 0 s or more, and there must be one")
         if self.start not in get_args(Start):
             raise ValueError(f"start is {self.start!r}: it must be one of {', '.join(get_args(Start))}")
         if not (np.isfinite(self.max_gap_s) and self.max_gap_s > 0.0):
@@ -167,7 +168,10 @@ def smooth_step(
 
 def _weight(count: FloatArray, elapsed_s: FloatArray, dt_s: float, params: SmoothingParams) -> FloatArray:
     """Filter weight of every time constant, (n_tau, ..., N_SATS) or broadcastable to it, where a filter goes on."""
-    steady: FloatArray = np.minimum(1.0, dt_s / np.array(params.tau_s)).reshape(-1, *(1,) * count.ndim)
+    tau_s = np.array(params.tau_s)
+    # with a time constant of 0, or an interval above it, the filter is the raw code
+    share: FloatArray = np.divide(dt_s, tau_s, out=np.ones(tau_s.shape), where=tau_s > dt_s)
+    steady = share.reshape(-1, *(1,) * count.ndim)
     if params.start == "invariant":
         return steady
     if params.start == "variable":

@@ -13,7 +13,7 @@ from gbas_core.satellites import SAT_IDS, missing
 from gbas_ground.monitors.ephemeris_change import check_ephemeris_change
 from gbas_ground.params import GroundParams
 from gbas_msgs_py.codes import EventKind
-from gbas_msgs_py.events import Event
+from gbas_msgs_py.events import Event, EventLog
 from gbas_vdb.messages.ephemeris_crc import ephemeris_crcs
 
 SOURCE = "ephemerides"
@@ -51,15 +51,11 @@ def receive(
     """Store newly received ephemerides, but for those that do not continue the ones before."""
     old = state.store.usable(gps_week, tow_s, 0.0)
     check = check_ephemeris_change(new, old, gps_week, tow_s, params.ephemeris.max_change_m)
-    events = tuple(
-        Event(
-            gps_week=gps_week, tow_s=tow_s, kind=EventKind.INPUT, subject=SAT_IDS[satellite],
-            cause="ephemeris_change", value=check.at(satellite)[0], threshold=check.at(satellite)[1], source=SOURCE,
-        )
-        for satellite in map(int, np.flatnonzero(check.failed))
-    )  # fmt: skip
-    accepted = _only(new, ~check.failed) if events else new
-    return replace(state, store=state.store.add(accepted)), events
+    events = EventLog(gps_week, tow_s, SOURCE)
+    for satellite in map(int, np.flatnonzero(check.failed)):
+        events.add(EventKind.INPUT, SAT_IDS[satellite], "ephemeris_change", *check.at(satellite))
+    accepted = _only(new, ~check.failed) if check.failed.any() else new
+    return replace(state, store=state.store.add(accepted)), events.all()
 
 
 def choose(
@@ -82,17 +78,12 @@ def choose(
     same = ((before == now) | (np.isnan(before) & np.isnan(now))).all(axis=0)
     changed = present & ~same
     crc = np.where(present, state.crc, np.nan)
-    events: tuple[Event, ...] = ()
+    events = EventLog(gps_week, tow_s, SOURCE)
     if changed.any():
         crc = np.where(changed, ephemeris_crcs(_only(current, changed)), crc)
-        events = tuple(
-            Event(
-                gps_week=gps_week, tow_s=tow_s, kind=EventKind.STATION, subject=SAT_IDS[satellite],
-                cause="new_ephemeris", value=float(current.iod[satellite]), source=SOURCE,
-            )
-            for satellite in map(int, np.flatnonzero(changed & was_present))
-        )  # fmt: skip
-    return EphemerisState(store=state.store, current=current, identity=now, crc=crc), changed, events
+        for satellite in map(int, np.flatnonzero(changed & was_present)):
+            events.add(EventKind.STATION, SAT_IDS[satellite], "new_ephemeris", float(current.iod[satellite]))
+    return EphemerisState(store=state.store, current=current, identity=now, crc=crc), changed, events.all()
 
 
 def _identity(ephemeris: Ephemeris) -> FloatArray:

@@ -8,6 +8,7 @@ import numpy as np
 
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import missing
+from gbas_core.signals import L1
 from gbas_ground.channels.tracking import Tracks
 from gbas_ground.consistency import CorrectionInputs, Corrections, Exclusions
 from gbas_ground.executive.satellite_status import SatelliteStatus
@@ -86,7 +87,7 @@ def _channels(
 ) -> _Entries:
     """Channels ``(R, N)``: what is wrong with a channel itself comes before what is wrong with its satellite."""
     by_receiver = np.broadcast_to(exclusions.receivers.excluded[:, np.newaxis], tracked.shape)
-    settling = np.isfinite(tracks.age_s) & ~correction_inputs.settled & (status.cause != ExclusionCause.BELOW_MASK)
+    settling = np.isfinite(tracks.age_of(L1)) & ~correction_inputs.settled & (status.cause != ExclusionCause.BELOW_MASK)
     usable = corrections.used & (status.state == ChannelState.USABLE)
     reasons = (
         (exclusions.channels.excluded, exclusions.channels.state, exclusions.channels.cause),

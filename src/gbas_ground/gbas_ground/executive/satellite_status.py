@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import N_SATS, missing
+from gbas_core.signals import L1
 from gbas_ground.channels.ephemerides import EphemerisState
 from gbas_ground.channels.tracking import Tracks
 from gbas_ground.claims.orbit_claim import claimed_decorrelation
@@ -49,7 +50,7 @@ def satellite_status(
     visible = correction_inputs.elevation_rad >= params.monitors.elevation_mask_rad
     usable = exclusions.usable_channels()
     ready = (usable & correction_inputs.ready).sum(axis=0)
-    settling = (usable & np.isfinite(tracks.age_s) & ~correction_inputs.ready).sum(axis=0)
+    settling = (usable & np.isfinite(tracks.age_of(L1)) & ~correction_inputs.ready).sum(axis=0)
     short = corrections.count < params.receivers.minimum
     waiting = short & (ready < params.receivers.minimum) & (ready + settling >= params.receivers.minimum)
     unmonitored = (

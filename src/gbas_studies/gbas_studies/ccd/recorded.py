@@ -16,7 +16,7 @@ from gbas_core.gnss.gpstime import epoch_key, from_epoch_key
 from gbas_core.io.recording import RecordedEpoch, Recording
 from gbas_core.parameters import made_of
 from gbas_core.ranging.divergence import DivergenceParams
-from gbas_core.ranging.slips import SlipParams, initial_slips, slip_step
+from gbas_core.ranging.slips import ChannelObservations, SlipParams, initial_slips, slip_step
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import N_SATS, satellites_of
 from gbas_core.signals import BANDS, L1, L2, L5, N_BANDS, SPEED_OF_LIGHT_MPS
@@ -271,10 +271,9 @@ class Observer:
         self._known, changed, _ = station_ephemerides.choose(self._known, week, tow_s, self._station)
         raw = stack(epoch.ground, satellites_of("GE"))
         predicted = predict_ranges(self._known.current, week, tow_s, raw.code_m[:, L1], self._site)
-        self._slips, found = slip_step(
-            self._slips, raw.code_m, raw.carrier_m, raw.doppler_hz, raw.lli, dt_s, self._params,
-            range_m=np.where(changed, np.nan, predicted.range_m - SPEED_OF_LIGHT_MPS * predicted.clock_s),
-        )  # fmt: skip
+        range_m = np.where(changed, np.nan, predicted.range_m - SPEED_OF_LIGHT_MPS * predicted.clock_s)
+        observed = ChannelObservations(raw.code_m, raw.carrier_m, raw.doppler_hz, raw.lli, range_m)
+        self._slips, found = slip_step(self._slips, observed, dt_s, self._params)
         # A channel that was away is not protected by the slip tests: it starts anew, as its smoothing filter does.
         present = np.isfinite(raw.code_m + raw.carrier_m)
         returned = present & ~self._present

@@ -1,0 +1,166 @@
+"""Fourth stage of an epoch: a tested position of every mode, and what is told about the satellites it is made of."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gbas_airborne.modes import subject_prefix
+from gbas_airborne.navigation.position import PositionInputs, PositionResult, Prior, tested_position
+from gbas_airborne.params import AirborneParams
+from gbas_airborne.ranging.corrected_ranges import Corrected, RangingSources
+from gbas_airborne.reception.receive import Received
+from gbas_airborne.reception.station_data import StationData
+from gbas_airborne.reception.vdb_messages import SOURCE
+from gbas_core.record import FloatArray
+from gbas_core.satellites import SAT_IDS
+from gbas_msgs_py.codes import EventKind, Rejection
+from gbas_msgs_py.events import Event, EventLog
+
+# Reasons that say nothing about a satellite itself: no event is made of them.
+_SILENT: Final = (Rejection.NO_STATION, Rejection.SYSTEM)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ModePosition:
+    """What a mode remembers of its positions.
+
+    Attributes
+    ----------
+    fix_ms, fix_m
+        When the last position was [ms since the start of GPS time], and where [m].
+    reason : (N_SATS,) int array
+        Why each satellite was not used in the last epoch with observations (Rejection).
+    held_until_ms : (N_SATS,) array
+        Until when the range test holds a satellite [ms]; -inf when it does not.
+    """
+
+    fix_ms: int | None = None
+    fix_m: FloatArray | None = None
+    reason: NDArray[np.int64] = field(default_factory=lambda: np.full(len(SAT_IDS), int(Rejection.NOT_TRACKED)))
+    held_until_ms: FloatArray = field(default_factory=lambda: np.full(len(SAT_IDS), -np.inf))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LocateState:
+    """What this stage remembers, by the number of the mode."""
+
+    modes: Mapping[int, ModePosition] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Located:
+    """What was received, and what became of the search for a position in each mode.
+
+    Attributes
+    ----------
+    received : Received
+    results : tuple of PositionResult
+        One a mode.
+    events : tuple of Event
+        What happened in this stage.
+    """
+
+    received: Received
+    results: tuple[PositionResult, ...]
+    events: tuple[Event, ...]
+
+
+def locate(state: LocateState, corrected: Corrected, params: AirborneParams) -> tuple[LocateState, Located]:
+    """A position of every mode, of its ranging sources."""
+    received, states = corrected.received, dict(state.modes)
+    results: list[PositionResult] = []
+    events: list[Event] = []
+    for sources in corrected.sources:
+        mode = sources.mode
+        before = states.get(mode.number, ModePosition())
+        result = _position(before, received, sources, params)
+        events += _changes(before.reason, result, received, params)
+        states[mode.number] = _after(before, received, result, params)
+        results.append(result)
+    return LocateState(modes=states), Located(received=received, results=tuple(results), events=tuple(events))
+
+
+def _position(
+    before: ModePosition, received: Received, sources: RangingSources, params: AirborneParams
+) -> PositionResult:
+    """A position without the satellites that are held out."""
+    held = (sources.reason == int(Rejection.NONE)) & (before.held_until_ms > received.epoch_ms)
+    if held.any():
+        sources = replace(sources, reason=np.where(held, int(Rejection.RANGE_TEST), sources.reason))
+    station, corrections = received.station, received.corrections.get(sources.mode.product)
+    if station is None or corrections is None:
+        return PositionResult(sources=sources, reason=sources.reason)
+    inputs = PositionInputs(
+        sources=sources,
+        corrections=corrections,
+        station=station,
+        approach=received.approach,
+        prior=_prior(before, received, station, params),
+    )
+    return tested_position(inputs, params)
+
+
+def _prior(before: ModePosition, received: Received, station: StationData, params: AirborneParams) -> Prior:
+    """Where to start, and what the own speed is estimated from: the last position if it is recent enough."""
+    if before.fix_m is None or before.fix_ms is None:
+        return Prior(start_m=station.reference_ecef_m)
+    dt_s = (received.epoch_ms - before.fix_ms) / 1000.0
+    if 0.0 < dt_s <= params.speed_history_s:
+        return Prior(start_m=before.fix_m, previous_m=before.fix_m, dt_s=dt_s)
+    return Prior(start_m=before.fix_m)
+
+
+def _after(before: ModePosition, received: Received, result: PositionResult, params: AirborneParams) -> ModePosition:
+    tripped = np.isfinite(result.range_error_m)
+    until_ms = received.epoch_ms + 1000.0 * params.range_test_hold_s
+    after = replace(before, reason=result.reason, held_until_ms=np.where(tripped, until_ms, before.held_until_ms))
+    if result.fix is None:
+        return after
+    return replace(after, fix_ms=received.epoch_ms, fix_m=result.fix.position_m)
+
+
+def _changes(
+    before: NDArray[np.int64], result: PositionResult, received: Received, params: AirborneParams
+) -> tuple[Event, ...]:
+    """An event for each satellite whose reason changed."""
+    prefix = subject_prefix(result.sources.mode.number, params)
+    events = EventLog(received.gps_week, received.tow_s, SOURCE)
+    for index in np.flatnonzero(before != result.reason):
+        old, new = Rejection(before[index]), Rejection(result.reason[index])
+        if new is Rejection.NONE:
+            events.add(EventKind.READMISSION, prefix + SAT_IDS[index], "used")
+        elif new not in _SILENT and (new is not Rejection.NOT_TRACKED or old is Rejection.NONE):
+            subject, value, threshold = _evidence(int(index), new, result, received, params)
+            events.add(EventKind.EXCLUSION, prefix + subject, new.name.lower(), value, threshold)
+    return events.all()
+
+
+def _evidence(
+    index: int, reason: Rejection, result: PositionResult, received: Received, params: AirborneParams
+) -> tuple[str, float, float]:
+    """Subject, value and threshold of an exclusion; an ephemeris is named by its satellite and issue of data."""
+    satellite, sources = SAT_IDS[index], result.sources
+    station, corrections = received.station, received.corrections.get(sources.mode.product)
+    if station is None or corrections is None:
+        return satellite, math.nan, math.nan
+    iod = corrections.iod[index]
+    numbers: dict[Rejection, tuple[float, float]] = {
+        Rejection.CORRECTION_AGE: (sources.age_s, params.correction_timeout_s),
+        Rejection.B_VALUES: (np.isfinite(corrections.b_m[:, index]).sum(), station.n_receivers),
+        Rejection.EPHEMERIS_IOD: (math.nan, iod),
+        Rejection.EPHEMERIS_CRC_MISSING: (sources.own_crc[index], math.nan),
+        Rejection.EPHEMERIS_CRC_MISMATCH: (sources.own_crc[index], received.checks.crc[index]),
+        Rejection.NOT_SETTLED: (sources.settled_s[index], params.settle_s),
+        Rejection.DISTANCE: (result.geometry.distance_m, station.d_max_m),
+        Rejection.ELEVATION: (math.degrees(result.geometry.elevation_rad[index]), params.elevation_mask_deg),
+        Rejection.RANGE_TEST: (result.range_error_m[index], params.range_test_floor_m),
+    }
+    about_ephemeris = Rejection.EPHEMERIS_IOD <= reason <= Rejection.EPHEMERIS_CRC_MISMATCH
+    subject = f"{satellite}/iod{iod:.0f}" if about_ephemeris and math.isfinite(iod) else satellite
+    return subject, *numbers.get(reason, (math.nan, math.nan))

@@ -1,0 +1,102 @@
+"""Second stage of an epoch: the own ranges, with slips found and smoothed for every mode."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+
+from gbas_airborne.modes import band_of
+from gbas_airborne.params import AirborneParams
+from gbas_airborne.reception.receive import Received
+from gbas_core.ranging.channel_filter import (
+    ChannelFilterParams,
+    ChannelFilterState,
+    FilteredChannels,
+    channel_filter_step,
+    initial_channel_filter,
+    sensible,
+)
+from gbas_core.ranging.slips import ChannelObservations, SlipParams
+from gbas_core.ranging.smoothing import SmoothingParams
+from gbas_core.record import FloatArray
+from gbas_msgs_py.modes import Mode
+
+# A pseudorange is some 2e7 m, and a receiver clock is not three seconds off: anything larger is no measurement.
+LARGEST_CODE_M: Final = 1e9
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SmoothedRanges:
+    """What the receiver measured on one signal: raw and smoothed code and the age of the filter, (N_SATS,) arrays."""
+
+    code_m: FloatArray
+    smoothed_m: FloatArray
+    settled_s: FloatArray
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Tracked:
+    """What was received, with the own ranges.
+
+    Attributes
+    ----------
+    received : Received
+    code_m : (N_BANDS, N_SATS) array
+        Raw pseudoranges [m].
+    channels : FilteredChannels
+        Of one receiver.
+    tau_s : tuple of float
+        Time constants of the smoothed ranges [s].
+    """
+
+    received: Received
+    code_m: FloatArray
+    channels: FilteredChannels
+    tau_s: tuple[float, ...]
+
+    def ranges(self, mode: Mode) -> SmoothedRanges:
+        """The ranges a mode works with."""
+        band = band_of(mode)
+        smoothed_m = self.channels.smoothed_of(band)[self.tau_s.index(mode.smoothing_s), 0]
+        settled_s = self.channels.age_of(band)[0]
+        return SmoothedRanges(code_m=self.code_m[band], smoothed_m=smoothed_m, settled_s=settled_s)
+
+
+@lru_cache(maxsize=8)
+def filter_params(modes: tuple[Mode, ...], params: AirborneParams) -> ChannelFilterParams:
+    """Settings of the filters: every band and time constant that a mode works with.
+
+    Carriers follow steps of the code by whole milliseconds: some receivers step their clock and apply it to the code
+    alone, which would look like a slip on every satellite.
+    """
+    return ChannelFilterParams(
+        bands=tuple(sorted({band_of(mode) for mode in modes})),
+        slips=SlipParams(
+            max_gap_s=params.max_gap_s, receiver_jerk_mps3=params.receiver_jerk_mps3, follow_code_steps=True
+        ),
+        smoothing=SmoothingParams(
+            tau_s=tuple(sorted({mode.smoothing_s for mode in modes}, reverse=True)), max_gap_s=params.max_gap_s
+        ),
+    )
+
+
+def track(
+    state: ChannelFilterState | None, received: Received, modes: tuple[Mode, ...], params: AirborneParams
+) -> tuple[ChannelFilterState, Tracked]:
+    """Smooth the own codes of an epoch with observations; `state` is None before the first."""
+    observations = received.observations
+    assert observations is not None
+    filters = filter_params(modes, params)
+    code_m = sensible(observations.code_m, LARGEST_CODE_M)
+    observed = ChannelObservations(
+        code_m[np.newaxis],
+        sensible(observations.carrier_m)[np.newaxis],
+        sensible(observations.doppler_hz)[np.newaxis],
+        sensible(observations.lli)[np.newaxis],
+    )
+    state = initial_channel_filter(filters) if state is None else state
+    state, channels = channel_filter_step(state, observed, received.epoch_ms, filters)
+    return state, Tracked(received=received, code_m=code_m, channels=channels, tau_s=filters.smoothing.tau_s)
