@@ -25,7 +25,7 @@ from dataclasses import dataclass, replace
 from typing import Final, Literal, NamedTuple
 
 import numpy as np
-from scipy.stats import binom
+from scipy.special import bdtrc
 
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import N_SATS
@@ -56,7 +56,7 @@ def fewest_others(p_false_alarm: float) -> int:
         For one source in 15 s.
     """
     faults = 0
-    while binom.sf(faults, _MOST_OTHERS, FAULT_RATE_PER_H * EXPOSURE_S / 3600.0) > p_false_alarm:
+    while bdtrc(faults, _MOST_OTHERS, FAULT_RATE_PER_H * EXPOSURE_S / 3600.0) > p_false_alarm:
         faults += 1
     return faults + 2
 

@@ -31,7 +31,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from gbas_core.record import BoolArray, FloatArray, IntArray
 from gbas_core.signals import L1, L5, WAVELENGTH_M
@@ -180,7 +180,7 @@ def gradient_site(positions_m: FloatArray, reference_m: FloatArray, params: Iono
             BandTests(places=own, k_ffd=false_alarm_multiplier(params.p_false_alarm, tests=each * len(own)))
             for own in sets
         ),
-        k_md=float(norm.isf(params.p_missed_detection)),
+        k_md=float(-ndtri(params.p_missed_detection)),
     )
 
 
