@@ -88,6 +88,15 @@ for package in src/*/package.xml; do
     touch "$index/$name"
     ln -sfn "$PWD/src/$name" "$venv/share/$name"
 done
-# Compiled loops are kept beside their modules: compiled here, no node is late at its start.
-"$venv/bin/python" -c "from gbas_ground.ionosphere.position_errors import compile_ahead; compile_ahead()"
+# Byte code and compiled loops are kept beside their modules: made here, no node is late at its start, also where the
+# environment keeps Python from writing byte code at each later one.
+env -u PYTHONDONTWRITEBYTECODE "$venv/bin/python" -c '
+import contextlib, importlib, pathlib, pkgutil
+from gbas_ground.ionosphere.position_errors import compile_ahead
+for name in sorted(path.parent.name for path in pathlib.Path("src").glob("*/setup.py")):
+    for module in pkgutil.walk_packages(importlib.import_module(name).__path__, name + "."):
+        with contextlib.suppress(ModuleNotFoundError):  # what only an installation of ROS has: launch
+            importlib.import_module(module.name)
+compile_ahead()
+'
 say "$venv is ready after $((SECONDS - started)) s"

@@ -6,12 +6,10 @@ test that has gone wrong, they are never part of what is measured.
 
 from __future__ import annotations
 
-import fcntl
 import os
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -30,26 +28,9 @@ from gbas_msgs_py import ros, tables, topics
 from gbas_msgs_py.qos import DATA, qos_of
 from gbas_node.transport import use_profile
 
-DOMAINS = range(60, 100)
 START_S = 60.0
 ANSWER_S = 3.0
 END_S = 30.0
-
-
-@pytest.fixture
-def domain() -> Iterator[int]:
-    """A domain id nobody else on this machine uses through this fixture, held by a lock on a file."""
-    folder = Path(tempfile.gettempdir()) / "gbas_test_domains"
-    folder.mkdir(exist_ok=True)
-    for number in DOMAINS:
-        with (folder / str(number)).open("w") as file:
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
-                continue
-            yield number
-            return
-    pytest.fail("no free ROS domain")
 
 
 class Process:
@@ -101,8 +82,8 @@ class Process:
 class Launcher:
     """Starts nodes in the test's domain and ends what is left of them."""
 
-    def __init__(self, domain: int, folder: Path) -> None:
-        self._environment = {**os.environ, "ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    def __init__(self, folder: Path) -> None:
+        self._environment = dict(os.environ)  # in which the fixture `domain` names it, and keeps it to this machine
         self._folder = folder
         self.processes: list[Process] = []
 
@@ -128,7 +109,7 @@ class Launcher:
 
 @pytest.fixture
 def launcher(domain: int, tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Launcher]:
-    launcher = Launcher(domain, tmp_path)
+    launcher = Launcher(tmp_path)
     yield launcher
     launcher.end_all()
     print(launcher.logs())  # pytest shows it when the test has failed

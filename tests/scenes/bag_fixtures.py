@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from gbas_bags.definitions import qos_record
 from gbas_bags.mcap_log import BagWriter, Topic
-from gbas_bringup.environment import free_domain
+from gbas_bringup.environment import held_domain
 from gbas_core.gnss.gpstime import epoch_key, from_epoch_key
 from gbas_core.gnss.observations import ObservationEpoch
 from gbas_core.record import Record
@@ -36,10 +37,19 @@ GPS_START_UNIX_S = 315964800  # 1980-01-06, as a Unix time
 
 
 @pytest.fixture
-def domain(monkeypatch: pytest.MonkeyPatch) -> int:
+def domain() -> Iterator[int]:
     """A ROS domain in which nothing else runs; nodes of the test itself keep to this machine as well."""
-    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    return free_domain()
+    with isolated_domain() as number:
+        yield number
+
+
+@contextmanager
+def isolated_domain() -> Iterator[int]:
+    """What :func:`domain` does, for fixtures that outlive a test."""
+    with held_domain() as number, pytest.MonkeyPatch.context() as environment:
+        environment.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        environment.setenv("ROS_DOMAIN_ID", str(number))
+        yield number
 
 
 def wait_until(condition: Callable[[], object], what: str, timeout_s: float = 60.0) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 import time
@@ -13,6 +12,7 @@ import yaml
 
 rclpy = pytest.importorskip("rclpy")
 
+from bag_fixtures import isolated_domain  # noqa: E402
 from gbas_core.gnss.gpstime import epoch_key  # noqa: E402
 from gbas_core.gnss.observations import ObservationEpoch  # noqa: E402
 from gbas_msgs_py import tables, topics  # noqa: E402
@@ -38,8 +38,6 @@ SITE = {
     },
     "sim": {"seed": 5, "flight": {"level_time_s": 0.0, "intercept_distance_m": 2000.0}},
 }  # fmt: skip
-# Away from the default domain and, by process, from other runs of the tests on this machine.
-DOMAIN_ID = 100 + os.getpid() % 100
 
 
 class Collector(GbasNode):
@@ -65,12 +63,19 @@ class Collector(GbasNode):
 
 
 @pytest.fixture(scope="module")
-def sent(tmp_path_factory):
+def site_domain():
+    """A domain for the module: nothing else runs in it, and it keeps to this machine."""
+    with isolated_domain() as number:
+        yield number
+
+
+@pytest.fixture(scope="module")
+def sent(tmp_path_factory, site_domain):
     """Everything sent in a short flight, by topic."""
     file = tmp_path_factory.mktemp("sim") / "site.yaml"
     file.write_text(yaml.safe_dump({"/**": {"ros__parameters": SITE}}))
     context = rclpy.Context()
-    rclpy.init(context=context, domain_id=DOMAIN_ID)
+    rclpy.init(context=context, domain_id=site_domain)
     values = {"config": str(file), "speed": 0.0, "wait_for": ["collector"], "wait_for_ground": ["collector"]}
     overrides = [rclpy.Parameter(name, value=value) for name, value in {**values, "sim.systems": "G"}.items()]
     simulator = Simulator(context=context, parameter_overrides=overrides)
@@ -135,14 +140,13 @@ def test_what_arrives_is_what_the_world_made(sent, world):
         (["-p", "speeed:=1.0"], "did you mean 'speed'"),
     ],
 )
-def test_bad_parameters_end_the_program_with_one_line(tmp_path, arguments, message):
+def test_bad_parameters_end_the_program_with_one_line(tmp_path, domain, arguments, message):
     if arguments and "nowhere" not in arguments[1]:
         file = tmp_path / "site.yaml"
         file.write_text(yaml.safe_dump(SITE))
         arguments = ["-p", f"config:={file}", *arguments]
     command = [sys.executable, "-m", "gbas_sim.nodes.simulator", "--ros-args", *arguments]
-    environment = {**os.environ, "ROS_DOMAIN_ID": str(DOMAIN_ID)}
-    ended = subprocess.run(command, capture_output=True, text=True, timeout=60, env=environment, check=False)
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     assert ended.returncode == 2
     assert message in ended.stderr
     assert len([line for line in ended.stderr.splitlines() if line.startswith("simulator:")]) == 1

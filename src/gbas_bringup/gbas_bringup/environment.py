@@ -7,17 +7,18 @@ import os
 import socket
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import IO, Final
+from typing import Final
 
 from gbas_core.errors import GbasError
 from gbas_node.transport import use_profile
 
 MAX_DOMAIN: Final = 232
-_FREE_DOMAINS: Final = range(20, 60)
+_FREE_DOMAINS: Final = range(20, 100)
 """Domains that are given out; their ports lie below those the system gives to programs at random (32768 and up)."""
-_held: list[IO[str]] = []
+_held: Final = ExitStack()
 _DISCOVERY_PORT: Final = 7400
 _PORTS_A_DOMAIN: Final = 250
 
@@ -66,10 +67,11 @@ def ament_prefix_path(environment: Mapping[str, str]) -> str:
     return os.pathsep.join(given)
 
 
-def free_domain() -> int:
+@contextmanager
+def held_domain() -> Iterator[int]:
     """A ROS domain in which nothing runs on this machine, so that a run neither disturbs nor is disturbed.
 
-    A lock that this process holds to its end keeps others of the suite from taking it as well.
+    A lock keeps others of the suite from taking it as well while it is held.
 
     Raises
     ------
@@ -80,18 +82,21 @@ def free_domain() -> int:
     folder.mkdir(mode=0o700, exist_ok=True)
     start = os.getpid() % len(_FREE_DOMAINS)
     for domain in (*_FREE_DOMAINS[start:], *_FREE_DOMAINS[:start]):
-        file = (folder / str(domain)).open("w")
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            file.close()
-            continue
-        if not _in_use(domain):
-            _held.append(file)
-            return domain
-        file.close()
+        with (folder / str(domain)).open("w") as file:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                continue
+            if not _in_use(domain):
+                yield domain
+                return
     last = _FREE_DOMAINS[-1]
     raise GbasError(f"every ROS domain from {_FREE_DOMAINS[0]} to {last} is in use on this machine; give one: --domain")
+
+
+def free_domain() -> int:
+    """A domain of :func:`held_domain` that this process holds to its end."""
+    return _held.enter_context(held_domain())
 
 
 def _in_use(domain: int) -> bool:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Final
 
-from scipy.stats import norm
+from scipy.special import ndtri
 
 K_FFMD_SINGLE: Final = 6.86
 """Fault-free multiplier with one reference receiver. Known."""
@@ -27,7 +27,7 @@ def k_ffmd(n_receivers: int, probability: float = 2.5e-8) -> float:
 
     Source: ICAO Annex 10 vol. I, table B-67 (5.762, 5.810, 5.847), from the probabilities behind it.
     """
-    return float(norm.isf(0.5 * probability / (n_receivers + 1)))
+    return float(-ndtri(0.5 * probability / (n_receivers + 1)))
 
 
 @lru_cache(maxsize=64)
@@ -36,4 +36,4 @@ def k_md(n_receivers: int, probability: float = 2.5e-8, receiver_fault_prior: fl
 
     Source: ICAO Annex 10 vol. I, table B-67 (2.935, 2.898, 2.878), from the probabilities behind it.
     """
-    return float(norm.isf((probability / (n_receivers + 1)) / (receiver_fault_prior / n_receivers)))
+    return float(-ndtri((probability / (n_receivers + 1)) / (receiver_fault_prior / n_receivers)))

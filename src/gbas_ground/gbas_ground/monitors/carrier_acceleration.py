@@ -26,7 +26,7 @@ from functools import cached_property
 from typing import Annotated, Final, Literal, NamedTuple
 
 import numpy as np
-from scipy.stats import binom
+from scipy.special import bdtrc
 
 from gbas_core.parameters import Derived, Parameter, ParameterError, parameters
 from gbas_core.record import BoolArray, FloatArray
@@ -59,7 +59,7 @@ def fewest_others(p_false_alarm: float) -> int:
         For one source in 15 s.
     """
     faults = 0
-    while binom.sf(faults, _MOST_OTHERS, FAULT_RATE_PER_H * EXPOSURE_S / 3600.0) > p_false_alarm:
+    while bdtrc(faults, _MOST_OTHERS, FAULT_RATE_PER_H * EXPOSURE_S / 3600.0) > p_false_alarm:
         faults += 1
     return faults + 2
 

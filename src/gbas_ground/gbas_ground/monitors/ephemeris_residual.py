@@ -31,7 +31,7 @@ from itertools import combinations
 from typing import Annotated, Final
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from gbas_core.parameters import Derived, Parameter, ParameterError, parameters
 from gbas_core.record import BoolArray, FloatArray
@@ -89,7 +89,7 @@ class EphemerisResidualParams:
     @property
     def k_md(self) -> float:
         """Standard deviations for missed detection."""
-        return float(norm.isf(self.p_missed_detection))
+        return float(-ndtri(self.p_missed_detection))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

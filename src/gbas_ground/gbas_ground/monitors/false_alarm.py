@@ -12,8 +12,7 @@ from functools import lru_cache
 from typing import Final
 
 import numpy as np
-from scipy.special import chdtrc, chndtr
-from scipy.stats import chi2, norm
+from scipy.special import chdtrc, chndtr, gammaln, ndtri, xlogy
 
 from gbas_core.ranging.divergence import white_noise_correlation
 
@@ -59,7 +58,7 @@ def false_alarm_multiplier(
     if tests < 1 or sides not in (1, 2) or not interval_s > 0.0:
         raise ValueError(f"tests {tests}, sides {sides}, interval {interval_s} s: at least 1, 1 or 2, above 0 s")
     epochs = max(1.0, EXPOSURE_S / interval_s)
-    return float(norm.isf(probability / (epochs * tests * sides)))
+    return float(-ndtri(probability / (epochs * tests * sides)))
 
 
 @lru_cache(maxsize=64)
@@ -104,7 +103,8 @@ def exposure_probability(
     # What is 12 deviations of a step below the threshold does not pass it in one step.
     lowest = max(0.0, limit - 12.0 * np.sqrt(rest))
     below = lowest + 0.5 * (limit - lowest) * (1.0 + _NODES)
-    density = 2.0 * below * chi2.pdf(below**2, freedom)
+    log_chi2 = xlogy(freedom / 2.0 - 1.0, below**2) - below**2 / 2.0 - gammaln(freedom / 2.0) - np.log(2.0) * freedom / 2.0
+    density = 2.0 * below * np.exp(log_chi2)
     passing = 1.0 - chndtr(limit**2 / rest, float(freedom), correlation**2 * below**2 / rest)
     upward = 0.5 * (limit - lowest) * float(_WEIGHTS @ (density * passing))
     return float(min(1.0, chdtrc(freedom, limit**2) + (max(1.0, exposure_s / interval_s) - 1.0) * upward))

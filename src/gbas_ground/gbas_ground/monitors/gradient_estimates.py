@@ -15,7 +15,7 @@ from typing import Final
 
 import numpy as np
 from scipy.linalg import block_diag
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from gbas_core.record import FloatArray
 from gbas_core.signals import IONO_RATIO, WAVELENGTH_M
@@ -70,7 +70,7 @@ def gradient_set(
     weight = slope / sigma**2
     gradient = whole @ weight / (slope @ weight)
     misfit = (((whole - gradient[:, np.newaxis] * slope) / sigma) ** 2).sum(axis=-1)
-    agrees = misfit <= chi2.isf(p_lost, max(1, delay.size - 1))
+    agrees = misfit <= chdtri(max(1, delay.size - 1), p_lost)
     kept = gradient[agrees & (np.abs(gradient) <= largest)]
     return np.asarray(kept[np.argsort(np.abs(kept), kind="stable")])
 
@@ -175,7 +175,7 @@ def gradient_vectors(
     misfit = np.einsum("ni,ij,nj->n", left, weight, left)
     kept = np.hypot(*vector.T) <= largest
     if delay.size > 2:
-        kept &= misfit <= chi2.isf(p_lost, delay.size - 2)
+        kept &= misfit <= chdtri(delay.size - 2, p_lost)
     order = np.argsort(misfit[kept], kind="stable")
     return GradientVectors(vector=vector[kept][order], misfit=misfit[kept][order], covariance=own)
 

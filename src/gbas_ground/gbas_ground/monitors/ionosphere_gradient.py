@@ -32,7 +32,7 @@ from functools import cached_property
 from typing import Annotated, Final
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from gbas_core.parameters import Derived, Parameter, ParameterError, parameters
 from gbas_core.record import BoolArray, FloatArray, IntArray
@@ -168,7 +168,7 @@ def gradient_site(positions_m: FloatArray, reference_m: FloatArray, params: Iono
             BandTests(places=own, k_ffd=false_alarm_multiplier(params.p_false_alarm, tests=each * len(own)))
             for own in sets
         ),
-        k_md=float(norm.isf(params.p_missed_detection)),
+        k_md=float(-ndtri(params.p_missed_detection)),
     )
 
 

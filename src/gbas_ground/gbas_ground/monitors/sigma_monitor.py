@@ -29,8 +29,7 @@ from typing import Annotated, Final, NamedTuple
 import numpy as np
 from scipy.linalg import eigvalsh_tridiagonal
 from scipy.optimize import brentq
-from scipy.special import ndtr
-from scipy.stats import chi2, norm
+from scipy.special import chdtri, ndtr, ndtri
 
 from gbas_core.parameters import Parameter, ParameterError, parameters
 from gbas_core.record import BoolArray, FloatArray
@@ -114,7 +113,7 @@ def quadratic_quantile(eigenvalues: FloatArray, probability: float, freedom: int
     """
     largest = float(eigenvalues.max())
     if eigenvalues.size == 1:
-        return largest * float(chi2.isf(probability, freedom))
+        return largest * float(chdtri(freedom, probability))
     # from a thousandth of the way to the pole, where the tail is nearly a half, to where it underflows
     t = brentq(
         lambda t: np.log(max(_saddle(eigenvalues, freedom, t)[1], 1e-300) / probability),
@@ -181,7 +180,7 @@ def _tables(params: SigmaMonitorParams, n_receivers: int) -> _Tables:
             # beyond four windows nothing changes any more
             used = min(int(count), int(np.ceil(4.0 * window / params.sample_s)))
             spread, eigenvalues = estimate_distribution(used, window, correlation, params.sample_s)
-            mean[*place, number] = norm.isf(0.5 * share) * np.sqrt(spread)
+            mean[*place, number] = -ndtri(0.5 * share) * np.sqrt(spread)
             variance[*place, number] = quadratic_quantile(eigenvalues, share)
         _, eigenvalues = estimate_distribution(_full(window, params), window, correlation, params.sample_s)
         for satellites in range(1, N_SATS + 1):
