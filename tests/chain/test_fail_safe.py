@@ -45,7 +45,6 @@ from gbas_core.gnss.gpstime import add_seconds, from_epoch_key, modified_z_count
 from gbas_core.gnss.observations import ObservationEpoch
 from gbas_core.satellites import N_SATS, RANGING_SOURCE_ID, SAT_INDEX
 from gbas_ground.broadcast import BroadcastState
-from gbas_ground.station import GroundStation
 from gbas_msgs_py.products import L1_100
 from gbas_msgs_py.records import IntegrityEpoch, SolutionEpoch
 from gbas_vdb.messages.types import Correction100, Message, Type1, Type2
@@ -758,7 +757,7 @@ SENDABLE: dict[str, tuple[float, float]] = {
 
 def _sent(integrity: IntegrityEpoch, chain: Any) -> dict[int, tuple[Correction100, float]]:
     """Valid corrections of a frame by satellite, each with P of the message where it is that of the satellite."""
-    _, bursts = GroundStation.broadcast(BroadcastState(), integrity, chain._ground_params)
+    _, bursts = chain._station.broadcast(BroadcastState(), integrity)
     assert bursts
     found: dict[int, tuple[Correction100, float]] = {}
     for burst in bursts:

@@ -161,7 +161,7 @@ def test_incomplete_satellite_is_not_sent(full, field, value):
     name, _, product = field.partition("/")
     values = getattr(integrity, name).copy()
     values[(PRODUCT_INDEX[product], satellite) if product else satellite] = value
-    _, bursts = GroundStation.broadcast(BroadcastState(), dataclasses.replace(integrity, **{name: values}), station)
+    _, bursts = GroundStation(station).broadcast(BroadcastState(), dataclasses.replace(integrity, **{name: values}))
     sent = {each.ranging_source_id for message in messages(bursts, Type1) for each in message.measurements}
     assert int(RANGING_SOURCE_ID[satellite]) not in sent
     assert len(sent) == (integrity.state == ChannelState.USABLE).sum() - 1
@@ -173,7 +173,7 @@ def test_b_value_beyond_the_field_is_not_sent(full):
     satellite = int(np.flatnonzero(integrity.state == ChannelState.USABLE)[0])
     b = integrity.b_m.copy()
     b[L1_100, 1, satellite] = 6.4
-    _, bursts = GroundStation.broadcast(BroadcastState(), dataclasses.replace(integrity, b_m=b), station)
+    _, bursts = GroundStation(station).broadcast(BroadcastState(), dataclasses.replace(integrity, b_m=b))
     sent = {each.ranging_source_id for message in messages(bursts, Type1) for each in message.measurements}
     assert int(RANGING_SOURCE_ID[satellite]) not in sent
 

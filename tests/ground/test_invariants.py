@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from gbas_core.gnss.gpstime import add_seconds
 from gbas_core.satellites import N_SATS
 from gbas_core.signals import L1
-from gbas_ground.station import GroundEpoch, GroundStation, initial_state
+from gbas_ground.station import GroundEpoch, GroundStation
 from gbas_msgs_py import tables
 from gbas_msgs_py.codes import ChannelState, ExclusionCause
 from gbas_msgs_py.products import L1_30, L1_100
@@ -86,7 +86,8 @@ def test_invariants_under_random_damage(ranges, seed, receivers, rate, settle_s)
         gast_d__enabled=True,
         vdb__slots="ABC",
     )
-    state = initial_state(station)
+    ready = GroundStation(station)
+    state = ready.initial_state()
     ephemeris = WORLDS[receivers].ephemeris
     received = (type(ephemeris)(**(vars(ephemeris) | {"tow_s": TOW_S - 1000.0})),)
     for number, observed in enumerate(ranges):
@@ -97,7 +98,7 @@ def test_invariants_under_random_damage(ranges, seed, receivers, rate, settle_s)
             observations=damaged(observed[:receivers], rng, rate),
             ephemerides=received if number == 0 else (),
         )
-        state, monitored, bursts = GroundStation.step(state, epoch, station)
+        state, monitored, bursts = ready.step(state, epoch)
         integrity, events = monitored.integrity, monitored.events
         check(integrity, station)
         assert not any(decode_burst(burst).errors for burst in bursts)

@@ -17,7 +17,7 @@ from gbas_core.parameters import replaced
 from gbas_core.satellites import N_SATS, SAT_INDEX
 from gbas_core.signals import SPEED_OF_LIGHT_MPS, WAVELENGTH_M
 from gbas_ground.params import GroundParams
-from gbas_ground.station import GroundEpoch, GroundStation, initial_monitor_state
+from gbas_ground.station import GroundEpoch, GroundStation
 from gbas_msgs_py.codes import ChannelState
 from gbas_sim.scenario import read_sections, scenario_from_yaml
 from gbas_sim.world import World
@@ -60,14 +60,15 @@ def changed(receiver, **quantities):
 def watched(world, station, change=lambda observed: observed, seconds=23.0, onset_s=0.0):
     """Usable satellites and receivers of each epoch, and the exclusions as (second, subject, cause)."""
     epochs, ephemeris = world
-    state, usable, receivers, told = initial_monitor_state(station), [], [], []
+    ready = GroundStation(station)
+    state, usable, receivers, told = ready.initial_integrity(), [], [], []
     for number, (key, observed) in enumerate(epochs[: round(2.0 * seconds) + 1]):
         week, tow_s = from_epoch_key(key)
         epoch = GroundEpoch(
             gps_week=week, tow_s=tow_s, observations=change(observed) if number >= 2.0 * onset_s else observed,
             ephemerides=(ephemeris,) if number == 0 else (),
         )  # fmt: skip
-        state, monitored = GroundStation.monitor(state, epoch, station)
+        state, monitored = ready.monitor(state, epoch)
         usable.append(int((monitored.integrity.state == ChannelState.USABLE).sum()))
         receivers.append(int(monitored.integrity.n_receivers))
         told += [(0.5 * number, each.subject, each.cause) for each in monitored.events if each.kind == "exclusion"]

@@ -14,7 +14,7 @@ from gbas_core.io.recording import Recording
 from gbas_core.parameters import made_of
 from gbas_core.satellites import SAT_INDEX
 from gbas_ground.params import GroundParams, watching
-from gbas_ground.station import GroundEpoch, GroundStation, initial_state
+from gbas_ground.station import GroundEpoch, GroundStation
 from gbas_msgs_py.codes import ChannelState
 from gbas_msgs_py.joining import ReceptionQueue
 from gbas_msgs_py.products import L1_30, L1_100
@@ -42,7 +42,8 @@ def station_at(positions_m, **changes):
 
 def run(recording, station, first=0, last=None):
     """Integrity and events of a recording; ephemerides as received."""
-    state, queue = initial_state(station), ReceptionQueue()
+    ready = GroundStation(station)
+    state, queue = ready.initial_state(), ReceptionQueue()
     for ephemeris in recording.ephemerides():
         queue.add(epoch_key(ephemeris.gps_week, ephemeris.tow_s), ephemeris)
     integrity, events = [], []
@@ -51,7 +52,7 @@ def run(recording, station, first=0, last=None):
         epoch = GroundEpoch(
             gps_week=week, tow_s=tow_s, observations=recorded.ground, ephemerides=queue.take(recorded.key)
         )
-        state, monitored, _ = GroundStation.step(state, epoch, station)
+        state, monitored, _ = ready.step(state, epoch)
         each, told = monitored.integrity, monitored.events
         integrity.append(each)
         events.extend(told)

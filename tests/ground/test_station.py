@@ -499,11 +499,10 @@ def test_week_rollover(normalised):
         world_epoch = world.observe(week, tow_s)
         received = (dataclasses.replace(world.ephemeris, tow_s=begin - 1000.0),) if state is None else ()
         if state is None:
-            from gbas_ground.station import initial_state
-
-            state = initial_state(station)
+            ready = GroundStation(station)
+            state = ready.initial_state()
         epoch = GroundEpoch(gps_week=week, tow_s=tow_s, observations=world_epoch, ephemerides=received)
-        state, monitored, _ = GroundStation.step(state, epoch, station)
+        state, monitored, _ = ready.step(state, epoch)
         integrity, events = monitored.integrity, monitored.events
         results.append(integrity)
         assert not [event for event in events if event.cause == "epoch_not_later"]

@@ -14,7 +14,7 @@ from gbas_core.gnss.observations import ObservationEpoch
 from gbas_core.parameters import made_of
 from gbas_core.record import FloatArray
 from gbas_ground.params import GroundParams
-from gbas_ground.station import GroundEpoch, GroundStation, StationState, initial_state
+from gbas_ground.station import GroundEpoch, GroundStation, StationState
 from gbas_msgs_py.events import Event
 from gbas_msgs_py.records import ChannelEpoch, IntegrityEpoch, MonitorEpoch
 from gbas_vdb.transmission.burst import Burst
@@ -86,7 +86,8 @@ def run(
     The constellation counts as received long before the start, unless `ephemerides` says what is received when.
     """
     received = {0.0: (_earlier(world.ephemeris),)} if ephemerides is None else ephemerides
-    result = Run([], [], [], [], [], [], initial_state(station) if state is None else state)
+    ready = GroundStation(station)
+    result = Run([], [], [], [], [], [], ready.initial_state() if state is None else state)
     for second in seconds:
         week, tow_s = add_seconds(*start, second)
         carrier = None if carrier_error_m is None else carrier_error_m(second)
@@ -97,7 +98,7 @@ def run(
             observations=change(second, observed),
             ephemerides=received.get(second, ()),
         )
-        result.state, monitored, bursts = GroundStation.step(result.state, epoch, station)
+        result.state, monitored, bursts = ready.step(result.state, epoch)
         result.seconds.append(second)
         result.integrity.append(monitored.integrity)
         result.statistics.append(monitored.statistics)

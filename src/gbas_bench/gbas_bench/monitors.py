@@ -15,14 +15,14 @@ from gbas_bench.world import bench_config, bench_world
 from gbas_core.errors import GbasError
 from gbas_core.gnss.ephemeris import Ephemeris
 from gbas_core.gnss.gpstime import from_epoch_key
-from gbas_ground import station
 from gbas_ground.params import GroundParams
-from gbas_ground.station import GroundEpoch, GroundStation, initial_monitor_state
+from gbas_ground.stages import correct, monitor
+from gbas_ground.station import GroundEpoch, GroundStation
 from gbas_msgs_py.codes import ChannelState
 
 BUDGET_S: Final = 2e-3
 SATELLITES_A_SYSTEM: Final = 20
-_MEASURED: Final = ("run_monitors", "monitor_sigmas")
+_MEASURED: Final = ((monitor, "run_monitors"), (correct, "monitor_sigmas"))
 """The station's functions that run the monitors of signals and of B values."""
 
 
@@ -31,7 +31,8 @@ def measure_monitors(n_epochs: int) -> Part:
     world = bench_world(SATELLITES_A_SYSTEM)
     ground = yaml.safe_load(bench_config().read_text(encoding="utf-8"))["/**"]["ros__parameters"]["ground"]
     params = GroundParams.from_mapping(ground)
-    state, spent_s = initial_monitor_state(params), []
+    station = GroundStation(params)
+    state, spent_s = station.initial_integrity(), []
     ephemerides: tuple[Ephemeris, ...] = (world.ephemeris,)
     with _Timer() as timer:
         for number in range(SETTLE_EPOCHS + n_epochs):
@@ -39,7 +40,7 @@ def measure_monitors(n_epochs: int) -> Part:
             week, tow_s = from_epoch_key(made.key)
             epoch = GroundEpoch(gps_week=week, tow_s=tow_s, observations=made.ground, ephemerides=ephemerides)
             timer.spent_s = 0.0
-            state, monitored = GroundStation.monitor(state, epoch, params)
+            state, monitored = station.monitor(state, epoch)
             spent_s.append(timer.spent_s)
             ephemerides = ()
     used = int((monitored.integrity.state == ChannelState.USABLE).sum())
@@ -59,7 +60,9 @@ class _Timer:
 
     def __init__(self) -> None:
         self.spent_s = 0.0
-        self._patches = [mock.patch.object(station, name, self._timed(getattr(station, name))) for name in _MEASURED]
+        self._patches = [
+            mock.patch.object(module, name, self._timed(getattr(module, name))) for module, name in _MEASURED
+        ]
 
     def _timed(self, function: Any) -> Any:
         def timed(*arguments: Any) -> Any:

@@ -24,7 +24,7 @@ from gbas_core.io.recording import RecordedEpoch
 from gbas_ground.broadcast import BroadcastState
 from gbas_ground.params import GroundParams
 from gbas_ground.sections import SmoothingSection
-from gbas_ground.station import GroundEpoch, GroundStation, Monitored, initial_monitor_state
+from gbas_ground.station import GroundEpoch, GroundStation, StationReport
 from gbas_msgs_py import tables
 from gbas_msgs_py.records import ProtectionEpoch, SolutionEpoch
 from gbas_vdb.transmission.receive import decode_burst
@@ -148,16 +148,15 @@ def measure_steps(flight: Flight) -> Part:
 
 def _step_through(flight: Flight, clock: _Clock) -> None:
     """The steps one by one, as the nodes take them."""
-    monitor, broadcast = initial_monitor_state(flight.ground), BroadcastState()
+    station = GroundStation(flight.ground)
+    monitor, broadcast = station.initial_integrity(), BroadcastState()
     position, service = PositionState(), ServiceState()
     ephemerides: tuple[Ephemeris, ...] = (flight.ephemeris,)
     for epoch in flight.epochs:
         week, tow_s = from_epoch_key(epoch.key)
         seen = GroundEpoch(gps_week=week, tow_s=tow_s, observations=epoch.ground, ephemerides=ephemerides)
-        monitor, monitored = clock.time("monitor", GroundStation.monitor, monitor, seen, flight.ground)
-        broadcast, bursts = clock.time(
-            "broadcast", GroundStation.broadcast, broadcast, monitored.integrity, flight.ground
-        )
+        monitor, monitored = clock.time("monitor", station.monitor, monitor, seen)
+        broadcast, bursts = clock.time("broadcast", station.broadcast, broadcast, monitored.integrity)
         heard = AirborneEpoch(
             gps_week=week, tow_s=tow_s, observations=epoch.user, bursts=bursts, ephemerides=ephemerides
         )
@@ -173,7 +172,7 @@ def _step_through(flight: Flight, clock: _Clock) -> None:
 def _convert(
     clock: _Clock,
     epoch: RecordedEpoch,
-    monitored: Monitored,
+    monitored: StationReport,
     solution: SolutionEpoch,
     protection: ProtectionEpoch,
 ) -> None:

@@ -17,8 +17,7 @@ from gbas_core.gnss.gpstime import epoch_key, from_epoch_key
 from gbas_core.gnss.observations import ObservationEpoch
 from gbas_core.io.recording import RecordedEpoch
 from gbas_ground.params import GroundParams
-from gbas_ground.station import GroundEpoch, GroundStation, Monitored, StationState
-from gbas_ground.station import initial_state as initial_station
+from gbas_ground.station import GroundEpoch, GroundStation, StationReport, StationState
 from gbas_msgs_py.events import Event
 from gbas_msgs_py.joining import AirborneInput, AirborneJoiner, ReceptionQueue
 from gbas_msgs_py.records import IntegrityEpoch, ProtectionEpoch, SolutionEpoch
@@ -32,7 +31,7 @@ Channel = Callable[[int, tuple[Burst, ...]], Iterable[Burst]]
 class GroundOutput:
     """What the station made of one epoch."""
 
-    monitored: Monitored
+    monitored: StationReport
     bursts: tuple[Burst, ...]
 
     @property
@@ -83,9 +82,9 @@ class Chain:
         ephemerides: Iterable[Ephemeris],
         user_ephemerides: Iterable[Ephemeris],
     ) -> None:
-        self._ground_params = ground
+        self._station = GroundStation(ground)
         self._airborne_params = airborne
-        self._ground_state: StationState = initial_station(ground)
+        self._ground_state: StationState = self._station.initial_state()
         self._airborne_state: AirborneState = AirborneState()
         self._ground_ephemerides = _queue(ephemerides)
         self._airborne_ephemerides = _queue(user_ephemerides)
@@ -117,7 +116,7 @@ class Chain:
     def ground_step(self, epoch: RecordedEpoch) -> GroundOutput:
         """Step the station alone."""
         week, tow_s = from_epoch_key(epoch.key)
-        self._ground_state, monitored, bursts = GroundStation.step(
+        self._ground_state, monitored, bursts = self._station.step(
             self._ground_state,
             GroundEpoch(
                 gps_week=week,
@@ -125,7 +124,6 @@ class Chain:
                 observations=tuple(_or_none(seen) for seen in epoch.ground),
                 ephemerides=self._ground_ephemerides.take(epoch.key),
             ),
-            self._ground_params,
         )
         return GroundOutput(monitored=monitored, bursts=bursts)
 

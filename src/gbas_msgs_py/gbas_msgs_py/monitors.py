@@ -297,17 +297,18 @@ SIGMA_MONITOR: Final = Monitor(
 MONITORS: Final[tuple[Monitor, ...]] = (
     EXPECTED_RANGE,
     SIGNAL_POWER,
-    EXPECTED_POWER,
+    COMMON_SLIP,
     CCD,
     CCD_F,
     CARRIER_ACCELERATION,
     IONOSPHERE_GRADIENT,
     EPHEMERIS_RESIDUAL,
-    COMMON_SLIP,
+    EXPECTED_POWER,
     B_VALUE,
     CORRECTION_LIMITS,
     SIGMA_MONITOR,
 )
+"""In the order in which the station runs them."""
 TESTS: Final[dict[TestKey, tuple[Monitor, MonitorTest]]] = {
     (monitor.number, test.number): (monitor, test) for monitor in MONITORS for test in monitor.tests
 }

@@ -23,7 +23,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Annotated, Final, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Final, Literal, NamedTuple
 
 import numpy as np
 from scipy.special import bdtrc
@@ -35,7 +35,14 @@ from gbas_core.signals import L1, L5, N_BANDS
 from gbas_ground.monitors.carrier_noise import CarrierNoise
 from gbas_ground.monitors.expected_range import row_median
 from gbas_ground.monitors.false_alarm import EPOCH_S, EXPOSURE_S, FALSE_EXCLUSION, false_alarm_multiplier
+from gbas_ground.monitors.interface import MonitoredEpoch, MonitorOutput, SignalMonitor, Verdict
+from gbas_ground.monitors.monitor_table import moved, place_of_worst, row_of, signal_of, summarise, worst_of
 from gbas_ground.monitors.result import MonitorResult, upper_limit
+from gbas_msgs_py.codes import ExclusionCause
+from gbas_msgs_py.monitors import CARRIER_ACCELERATION
+
+if TYPE_CHECKING:
+    from gbas_ground.prepared import PreparedStation
 
 STATISTICS: Final = ("step_m", "rate_mps", "acceleration_mps2")
 Fault = Literal["step", "ramp", "acceleration"]
@@ -452,3 +459,66 @@ def detectable_fault(
     with np.errstate(divide="ignore"):
         sizes = [needed / np.abs(fault_response(fault, each, params, interval_s)) for each in ages]
     return float(np.min(sizes))
+
+
+# --- in the station
+
+
+_TESTS: Final = tuple(CARRIER_ACCELERATION.test(name) for name in ("step", "rate", "acceleration"))
+"""In the order of the statistics."""
+
+
+def _initial(station: PreparedStation) -> CarrierAccelerationState:
+    return initial_carrier_acceleration(station.params.n_receivers, station.carrier_acceleration)
+
+
+def _step(state: CarrierAccelerationState, epoch: MonitoredEpoch) -> tuple[CarrierAccelerationState, MonitorOutput]:
+    inputs, params = epoch.inputs, epoch.inputs.station.carrier_acceleration
+    bands = list(params.bands)
+    state, found = carrier_acceleration_step(
+        state,
+        inputs.residual_m[:, bands],
+        inputs.slipped[:, bands],
+        inputs.ready & inputs.due,
+        inputs.predicted.elevation_rad,
+        inputs.dt_s,
+        params,
+        shift_m=inputs.shift_m,
+    )
+    known = np.isfinite(found.satellites.statistic[0, 0])
+    signal = signal_of(params.bands)
+    return state, MonitorOutput(
+        summaries={
+            CARRIER_ACCELERATION.key(test.name): summarise(row_of(found.satellites, number), inputs.due, signal)
+            for number, test in enumerate(_TESTS)
+        },
+        satellites=_satellite_verdicts(found, inputs.due & known) if params.exclude else (),
+        channels=_channel_verdicts(found) if params.exclude else (),
+        ready=known if params.exclude else None,
+    )
+
+
+def _satellite_verdicts(found: CarrierAccelerationResult, due: BoolArray) -> tuple[Verdict, ...]:
+    """A satellite's cause is the statistic that is furthest over its threshold."""
+    failed = due & found.failed_satellites
+    if not failed.any():
+        return ()
+    worst = worst_of(found.satellites, axes=2)
+    number, _ = place_of_worst(found.satellites, axes=2)
+    return tuple(
+        Verdict(test.cause, replace(worst, failed=failed & (number == place))) for place, test in enumerate(_TESTS)
+    )
+
+
+def _channel_verdicts(found: CarrierAccelerationResult) -> tuple[Verdict, ...]:
+    """The worst statistic of each channel; one that is missing makes nobody fail, but is not ready."""
+    if not found.failed_channels.any():
+        return ()
+    worst = worst_of(moved(found.channels, 2, 1), axes=2)
+    failed = found.failed_channels & (worst.statistic > worst.threshold)
+    return (Verdict(ExclusionCause.CARRIER_ACCELERATION, replace(worst, failed=failed)),)
+
+
+MONITOR: Final = SignalMonitor(
+    entry=CARRIER_ACCELERATION, parameters=CarrierAccelerationParams, initial=_initial, step=_step
+)

@@ -10,7 +10,7 @@ Source: Jiang, Milner, Macabiau, ENC 2015, eq (1) to (4) and 2.1.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Final
 
 import numpy as np
 
@@ -27,9 +27,17 @@ from gbas_core.ranging.divergence import (
     settled,
 )
 from gbas_core.record import BoolArray, FloatArray
-from gbas_core.signals import N_BANDS
+from gbas_core.satellites import missing
+from gbas_core.signals import L1, N_BANDS
 from gbas_ground.monitors.false_alarm import exposure_probability, least_correlation
+from gbas_ground.monitors.interface import MonitoredEpoch, MonitorOutput, SignalMonitor, verdicts
+from gbas_ground.monitors.monitor_table import row_of, summarise
 from gbas_ground.monitors.result import MonitorResult, upper_limit
+from gbas_msgs_py.monitors import CCD
+from gbas_msgs_py.records import MAX_REFERENCE_RECEIVERS
+
+if TYPE_CHECKING:
+    from gbas_ground.prepared import PreparedStation
 
 
 @parameters
@@ -145,3 +153,30 @@ def receiver_mean(values: FloatArray, averaged: BoolArray) -> tuple[FloatArray, 
     count = averaged.sum(axis=0)
     total = np.where(averaged, values, 0.0).sum(axis=0)
     return np.where(count > 0, total / np.maximum(count, 1), np.nan), count
+
+
+# --- in the station
+
+
+def _initial(station: PreparedStation) -> DivergenceState:
+    return initial_ccd(station.ccd, station.params.n_receivers)
+
+
+def _step(state: DivergenceState, epoch: MonitoredEpoch) -> tuple[DivergenceState, MonitorOutput]:
+    """Corrections are on L1: its rates count."""
+    inputs = epoch.inputs
+    params = inputs.station.ccd
+    state, found = ccd_step(state, inputs.code_m, inputs.carrier_m, inputs.slipped, inputs.ready, inputs.dt_s, params)
+    result = row_of(found.satellites, L1)
+    by_receiver = missing(MAX_REFERENCE_RECEIVERS)
+    by_receiver[: len(found.receiver_mps)] = found.receiver_mps[:, L1]
+    test = CCD.test("rate")
+    return state, MonitorOutput(
+        summaries={CCD.key(test.name): summarise(result, inputs.due)},
+        details={"ccd_receiver_mps": by_receiver},
+        satellites=verdicts(params.exclude, test.cause, result, inputs.due, power=1),
+        ready=found.receivers[L1] > 0 if params.exclude else None,
+    )
+
+
+MONITOR: Final = SignalMonitor(entry=CCD, parameters=CcdParams, initial=_initial, step=_step)

@@ -32,7 +32,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Annotated, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import numpy as np
 from scipy.special import chdtri
@@ -49,9 +49,10 @@ from gbas_core.ranging.divergence import (
     settled,
 )
 from gbas_core.record import BoolArray, FloatArray
-from gbas_core.satellites import CLOCK_GROUPS, N_SATS
+from gbas_core.satellites import CLOCK_GROUPS, N_SATS, missing
 from gbas_core.signals import BAND_INDEX, L1, L5, SPEED_OF_LIGHT_MPS
 from gbas_ground.monitors.ccd import receiver_mean
+from gbas_ground.monitors.divergence_classification import MODES, NO_FAULT, classify
 from gbas_ground.monitors.divergence_covariance import (
     PRINTED_COVARIANCE,
     StatisticCovariance,
@@ -61,7 +62,14 @@ from gbas_ground.monitors.divergence_covariance import (
 )
 from gbas_ground.monitors.expected_range import row_median
 from gbas_ground.monitors.false_alarm import exposure_probability, least_correlation
+from gbas_ground.monitors.interface import MonitoredEpoch, MonitorOutput, SignalMonitor, Verdict, verdicts
+from gbas_ground.monitors.monitor_table import summarise
 from gbas_ground.monitors.result import MonitorResult, upper_limit
+from gbas_msgs_py.codes import Signal
+from gbas_msgs_py.monitors import CCD_F
+
+if TYPE_CHECKING:
+    from gbas_ground.prepared import PreparedStation
 
 Form = Literal["paper", "sound"]
 DEGREES_OF_FREEDOM: Final[dict[Form, int]] = {"paper": 4, "sound": 3}
@@ -498,3 +506,54 @@ def _others_mean(
     others = count - member
     mean = (total - own) / np.maximum(others, 1.0)
     return np.where(others >= fewest, mean, np.nan), others
+
+
+# --- in the station
+
+
+def _initial(station: PreparedStation) -> TwoFrequencyState:
+    return initial_two_frequency(station.ccd_f, station.params.n_receivers)
+
+
+def _step(state: TwoFrequencyState, epoch: MonitoredEpoch) -> tuple[TwoFrequencyState, MonitorOutput]:
+    """Where a satellite has no second band there is nothing to judge: the single-band monitor has it."""
+    inputs, params = epoch.inputs, epoch.inputs.station.ccd_f
+    given = TwoFrequencyInput(
+        code_m=inputs.code_m,
+        carrier_m=inputs.carrier_m,
+        restarted=inputs.slipped,
+        range_m=inputs.predicted.range_m,
+        clock_s=inputs.predicted.clock_s,
+        rebased=inputs.rebased,
+        elevation_rad=inputs.predicted.elevation_rad,
+        used=inputs.ready,
+        clock_used=inputs.usable,
+    )
+    state, found = two_frequency_step(state, given, inputs.dt_s, params)
+    forms = {"full_rank": found.sound, "published": found.paper}
+    due = inputs.due & (found.receivers > 0)
+    signal = Signal.L1_L5 if params.other == L5 else Signal.L1_L2
+    satellites: tuple[Verdict, ...] = ()
+    if params.exclude != "none":
+        satellites = verdicts(True, CCD_F.test(params.exclude).cause, forms[params.exclude], due, power=2)
+    return state, MonitorOutput(
+        summaries={CCD_F.key(name): summarise(result, due, signal) for name, result in forms.items()},
+        details={"divergence_mps": found.mean_mps, **_likeliest_mode(found, due, params)},
+        satellites=satellites,
+    )
+
+
+def _likeliest_mode(epoch: TwoFrequencyEpoch, due: BoolArray, params: TwoFrequencyParams) -> dict[str, FloatArray]:
+    """Mode and its probability of the satellites that fail; missing for the rest."""
+    failed = due & epoch.sound.failed & np.isfinite(epoch.sound.statistic)
+    if not failed.any():
+        return {}
+    found = classify(epoch.mean_mps[[0, 1, 3]][:, failed], epoch.covariance[failed], params.band, params.other)
+    mode, probability = missing(), missing()
+    number = found.posterior.argmax(axis=0)
+    mode[failed] = np.where(number == MODES.index(NO_FAULT), 0, number + 1)
+    probability[failed] = found.posterior.max(axis=0)
+    return {"ccd_f_mode": mode, "ccd_f_mode_probability": probability}
+
+
+MONITOR: Final = SignalMonitor(entry=CCD_F, parameters=TwoFrequencyParams, initial=_initial, step=_step)

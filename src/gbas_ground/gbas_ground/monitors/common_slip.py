@@ -6,10 +6,16 @@ A step of more than a few centimetres restarts the filters of every receiver by 
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
 from gbas_core.record import BoolArray
+from gbas_core.signals import L1
+from gbas_ground.monitors.interface import MonitoredEpoch, MonitorOutput, SignalMonitor, Verdict, no_memory
+from gbas_ground.monitors.monitor_table import summarise
 from gbas_ground.monitors.result import MonitorResult, upper_limit
+from gbas_msgs_py.monitors import COMMON_SLIP
 
 _MOST_SHARE = 0.5
 """When more of the tracked satellites slip at once, it is not the satellites. Ours."""
@@ -39,3 +45,21 @@ def check_common_slip(slipped: BoolArray, tracked: BoolArray, due: BoolArray) ->
     several = number > 1.0
     most = several.sum() > _MOST_SHARE * max(1, int(tracked.any(axis=0).sum()))
     return upper_limit(number, 1.0, due & (not most))
+
+
+# --- in the station
+
+
+def _step(state: None, epoch: MonitoredEpoch) -> tuple[None, MonitorOutput]:
+    """A satellite that steps has no settled filters any more, so `due` does not have it."""
+    inputs = epoch.inputs
+    tracked = np.isfinite(inputs.code_m[:, L1] + inputs.carrier_m[:, L1])
+    result = check_common_slip(inputs.slipped[:, L1], tracked, inputs.in_use)
+    test = COMMON_SLIP.test("slips")
+    return state, MonitorOutput(
+        summaries={COMMON_SLIP.key(test.name): summarise(result, inputs.in_use)},
+        satellites=(Verdict(test.cause, result),),
+    )
+
+
+MONITOR: Final = SignalMonitor(entry=COMMON_SLIP, parameters=None, initial=no_memory, step=_step)

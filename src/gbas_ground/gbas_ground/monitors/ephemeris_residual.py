@@ -28,7 +28,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 import numpy as np
 from scipy.special import ndtri
@@ -40,7 +40,13 @@ from gbas_core.signals import L1, L5, N_BANDS, WAVELENGTH_M
 from gbas_ground.monitors.carrier_noise import CarrierNoise
 from gbas_ground.monitors.double_difference import Baselines, DoubleDifferences, decided
 from gbas_ground.monitors.false_alarm import FALSE_EXCLUSION, false_alarm_multiplier
+from gbas_ground.monitors.interface import MonitoredEpoch, MonitorOutput, SignalMonitor, verdicts
+from gbas_ground.monitors.monitor_table import signal_of, summarise
 from gbas_ground.monitors.result import MonitorResult, upper_limit
+from gbas_msgs_py.monitors import EPHEMERIS_RESIDUAL
+
+if TYPE_CHECKING:
+    from gbas_ground.prepared import PreparedStation
 
 REFERENCE_ELEVATION_RAD: Final = float(np.radians(30.0))
 """Lowest reference satellite that a site's P is reckoned with. Ours; :mod:`gbas_ground.claims.orbit_claim` has the
@@ -271,3 +277,30 @@ def assumed_sigma_m(
     sigma = noise.sigma_m(elevation_rad, params.bands[:1])
     reference = noise.sigma_m(np.array([reference_elevation_rad]), params.bands[:1])
     return np.asarray(scale * np.hypot(sigma, reference))
+
+
+# --- in the station
+
+
+def _initial(station: PreparedStation) -> EphemerisResidualState:
+    return initial_ephemeris_residual(len(station.gradient_site.baselines), station.ephemeris_residual)
+
+
+def _step(state: EphemerisResidualState, epoch: MonitoredEpoch) -> tuple[EphemerisResidualState, MonitorOutput]:
+    """Satellites whose orbits are not bounded are not ready where that is required."""
+    inputs, station = epoch.inputs, epoch.inputs.station
+    baselines, params = station.gradient_site.baselines, station.ephemeris_residual
+    state, result = ephemeris_residual_step(
+        state, epoch.fitting.differences, baselines, inputs.due, inputs.dt_s, params, shift_m=inputs.shift_m
+    )
+    due, test = inputs.due & (len(baselines) > 0), EPHEMERIS_RESIDUAL.test("residual")
+    return state, MonitorOutput(
+        summaries={EPHEMERIS_RESIDUAL.key(test.name): summarise(result, due, signal_of(params.bands))},
+        satellites=verdicts(params.exclude, test.cause, result, inputs.due, power=1),
+        ready=epoch.orbit_bound <= station.largest_decorrelation if station.orbit_required else None,
+    )
+
+
+MONITOR: Final = SignalMonitor(
+    entry=EPHEMERIS_RESIDUAL, parameters=EphemerisResidualParams, initial=_initial, step=_step
+)

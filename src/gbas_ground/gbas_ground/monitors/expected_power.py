@@ -14,8 +14,8 @@ numbers ours).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Annotated, Final
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Annotated, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,7 +25,13 @@ from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import N_SATS
 from gbas_core.signals import L1, L5, N_BANDS
 from gbas_ground.monitors.false_alarm import EPOCH_S, FALSE_EXCLUSION, false_alarm_multiplier
+from gbas_ground.monitors.interface import MonitoredEpoch, MonitorOutput, SignalMonitor, Verdict, verdicts
+from gbas_ground.monitors.monitor_table import moved, signal_of, summarise, worst_of
 from gbas_ground.monitors.result import MonitorResult, upper_limit
+from gbas_msgs_py.monitors import EXPECTED_POWER
+
+if TYPE_CHECKING:
+    from gbas_ground.prepared import PreparedStation
 
 BIN_RAD: Final = float(np.radians(5.0))
 """Width of the bins of elevation a station learns in [rad]. Ours."""
@@ -263,3 +269,35 @@ def _taught(
     weight = np.where(number > 0, np.maximum(dt_s / np.maximum(learnt_s, dt_s), dt_s / params.learn_s), 0.0)
     mean = total / np.maximum(number, 1)
     return state.learnt_dbhz + weight * (mean - state.learnt_dbhz), learnt_s
+
+
+# --- in the station
+
+
+def _initial(station: PreparedStation) -> PowerExpectationState:
+    return initial_power_expectation(station.params.n_receivers, station.expected_power)
+
+
+def _step(state: PowerExpectationState, epoch: MonitoredEpoch) -> tuple[PowerExpectationState, MonitorOutput]:
+    """A receiver that gives no C/N0 fails where the station requires it, and is not looked at otherwise."""
+    inputs, params = epoch.inputs, epoch.inputs.station.expected_power
+    given = np.isfinite(inputs.cn0_dbhz[:, L1])
+    due = inputs.ready & inputs.due & (given | inputs.station.params.signal_power.require_cn0)
+    state, found = power_expectation_step(
+        state, inputs.cn0_dbhz, due, inputs.predicted.elevation_rad, inputs.dt_s, params
+    )
+    worst = worst_of(found.satellites, axes=1)
+    satellites = replace(worst, failed=np.logical_or.reduce(found.satellites.failed))
+    test = EXPECTED_POWER.test("satellite")
+    channels: tuple[Verdict, ...] = ()
+    if params.exclude and found.channels.failed.any():
+        channels = (Verdict(test.cause, worst_of(moved(found.channels, 1, 0), axes=1)),)
+    summary = summarise(satellites, np.logical_or.reduce(due), signal_of(params.bands))
+    return state, MonitorOutput(
+        summaries={EXPECTED_POWER.key(test.name): summary},
+        satellites=verdicts(params.exclude, test.cause, satellites, inputs.due),
+        channels=channels,
+    )
+
+
+MONITOR: Final = SignalMonitor(entry=EXPECTED_POWER, parameters=PowerExpectationParams, initial=_initial, step=_step)

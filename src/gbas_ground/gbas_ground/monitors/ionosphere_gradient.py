@@ -29,14 +29,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import numpy as np
 from scipy.special import ndtri
 
 from gbas_core.parameters import Derived, Parameter, ParameterError, parameters
 from gbas_core.record import BoolArray, FloatArray, IntArray
-from gbas_core.signals import BAND_INDEX, WAVELENGTH_M, Band
+from gbas_core.satellites import missing
+from gbas_core.signals import BAND_INDEX, L1, L5, WAVELENGTH_M, Band
 from gbas_ground.monitors.carrier_noise import CarrierNoise
 from gbas_ground.monitors.double_difference import Baselines, DoubleDifferences, Pairing, baselines_of, decided
 from gbas_ground.monitors.false_alarm import FALSE_EXCLUSION, false_alarm_multiplier
@@ -50,7 +51,14 @@ from gbas_ground.monitors.gradient_detectability import (
     projected_length_m,
 )
 from gbas_ground.monitors.gradient_estimates import gradient_set
+from gbas_ground.monitors.interface import MonitoredEpoch, MonitorOutput, SignalMonitor, no_memory, verdicts
+from gbas_ground.monitors.monitor_table import signal_of, summarise
 from gbas_ground.monitors.result import MonitorResult, upper_limit
+from gbas_msgs_py.monitors import IONOSPHERE_GRADIENT
+from gbas_msgs_py.records import BASELINES
+
+if TYPE_CHECKING:
+    pass
 
 _LEVEL: Final = 1.05  # sigmas are rounded up by at most this factor when the coverage is looked up
 _PER_STEP: Final = float(1.0 / np.log(_LEVEL))
@@ -396,3 +404,38 @@ def _smallest_gradients(
         if explained.size:
             result[satellite] = explained[0]
     return result
+
+
+# --- in the station
+
+
+def _step(state: None, epoch: MonitoredEpoch) -> tuple[None, MonitorOutput]:
+    inputs, station = epoch.inputs, epoch.inputs.station
+    site, params, differences = station.gradient_site, station.ionosphere_gradient, epoch.fitting.differences
+    found = check_ionosphere_gradient(differences, inputs.due, site, params)
+    due = inputs.due & (len(site.baselines) > 0)
+    test = IONOSPHERE_GRADIENT.test("gradient")
+    return state, MonitorOutput(
+        summaries={IONOSPHERE_GRADIENT.key(test.name): summarise(found.verdict, due, signal_of(params.bands))},
+        details=_details(found, differences, site, params.bands),
+        satellites=verdicts(params.exclude, test.cause, found.verdict, due, power=1),
+        ready=found.monitored if station.gradient_required else None,
+    )
+
+
+def _details(
+    found: GradientResult, differences: DoubleDifferences, site: GradientSite, bands: tuple[int, ...]
+) -> dict[str, Any]:
+    details: dict[str, Any] = {"gradient": found.gradient, "gradient_coverage": found.coverage}
+    pairs = zip(site.baselines.first, site.baselines.second, strict=True)
+    places = [BASELINES.index((i + 1, j + 1)) for i, j in pairs]
+    for name, band in (("double_difference_m", L1), ("double_difference_l5_m", L5)):
+        if band in bands:
+            details[name] = missing(len(BASELINES))
+            details[name][places] = differences.residual_m[:, bands.index(band)]
+    return details
+
+
+MONITOR: Final = SignalMonitor(
+    entry=IONOSPHERE_GRADIENT, parameters=IonosphereGradientParams, initial=no_memory, step=_step
+)

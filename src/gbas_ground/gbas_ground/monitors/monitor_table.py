@@ -134,3 +134,19 @@ def monitor_detail_epoch(
     return MonitorDetailEpoch(
         gps_week=gps_week, tow_s=tow_s, **{name: np.where(shown, value, np.nan) for name, value in details.items()}
     )
+
+
+def moved(result: MonitorResult, source: int, destination: int) -> MonitorResult:
+    """The same with one axis elsewhere."""
+    shape = result.statistic.shape
+    return MonitorResult(
+        statistic=np.moveaxis(result.statistic, source, destination),
+        threshold=np.moveaxis(np.broadcast_to(result.threshold, shape), source, destination),
+        failed=np.moveaxis(np.broadcast_to(result.failed, shape), source, destination),
+    )
+
+
+def row_of(result: MonitorResult, row: int) -> MonitorResult:
+    """One row of a result's first axis."""
+    threshold = np.broadcast_to(result.threshold, result.statistic.shape)
+    return MonitorResult(statistic=result.statistic[row], threshold=threshold[row], failed=result.failed[row])

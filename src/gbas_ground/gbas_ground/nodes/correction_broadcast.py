@@ -19,7 +19,7 @@ class CorrectionBroadcast(GbasNode):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("correction_broadcast", ConfiguredParams, **kwargs)
-        self.station = station_params(self, self.params.config)
+        self.station = GroundStation(station_params(self, self.params.config))
         self.state = BroadcastState()
         self.bursts_sent = 0
         self.send = self.burst_publisher(topics.VDB, readers=1)
@@ -29,7 +29,7 @@ class CorrectionBroadcast(GbasNode):
         self.when_ready(partial(self.step, integrity))
 
     def step(self, integrity: IntegrityEpoch) -> None:
-        self.state, bursts = GroundStation.broadcast(self.state, integrity, self.station)
+        self.state, bursts = self.station.broadcast(self.state, integrity)
         for burst in bursts or (empty_frame(integrity.gps_week, integrity.tow_s),):
             self.send(burst)
         self.bursts_sent += len(bursts)

@@ -9,7 +9,7 @@ from typing import Any
 from gbas_core.gnss.gpstime import epoch_key, from_epoch_key
 from gbas_core.gnss.observations import ObservationEpoch
 from gbas_ground.nodes.configuration import station_params
-from gbas_ground.station import GroundEpoch, GroundStation, initial_monitor_state
+from gbas_ground.station import GroundEpoch, GroundStation
 from gbas_msgs_py import tables, topics
 from gbas_msgs_py.joining import EpochJoiner, JoinedEpoch
 from gbas_node.node import GbasNode, JoiningParams, run
@@ -20,9 +20,10 @@ class IntegrityMonitor(GbasNode):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("integrity_monitor", JoiningParams, **kwargs)
-        self.station = station_params(self, self.params.config)
-        self.state = initial_monitor_state(self.station)
-        self.receivers = tuple(f"rr{j}" for j in range(1, self.station.n_receivers + 1))
+        params = station_params(self, self.params.config)
+        self.station = GroundStation(params)
+        self.state = self.station.initial_integrity()
+        self.receivers = tuple(f"rr{j}" for j in range(1, params.n_receivers + 1))
         self.joiner: EpochJoiner[ObservationEpoch] = EpochJoiner(self.receivers, timeout_s=self.params.join_timeout_s)
         self.integrity = self.table_publisher(topics.GROUND_INTEGRITY, tables.INTEGRITY, readers=1)
         self.statistics = self.table_publisher(topics.GROUND_MONITORS, tables.MONITORS)
@@ -57,12 +58,12 @@ class IntegrityMonitor(GbasNode):
             observations=tuple(None if each is None or each.empty else each for each in seen),
             ephemerides=self.ephemerides.take(joined.key),
         )
-        self.state, monitored = GroundStation.monitor(self.state, epoch, self.station)
-        self.integrity.publish(monitored.integrity)
-        self.statistics.publish(monitored.statistics)
-        self.monitor_details.publish(monitored.details)
-        self.channels.publish(monitored.channels)
-        self.publish_events(monitored.events)
+        self.state, report = self.station.monitor(self.state, epoch)
+        self.integrity.publish(report.integrity)
+        self.statistics.publish(report.statistics)
+        self.monitor_details.publish(report.details)
+        self.channels.publish(report.channels)
+        self.publish_events(report.events)
         self.finished_epoch(week, tow_s)
 
     def details(self) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from gbas_core.gnss.ephemeris import Ephemeris
 from gbas_core.gnss.gpstime import epoch_key, from_epoch_key
 from gbas_core.satellites import RANGING_SOURCE_ID, SAT_INDEX
 from gbas_ground.params import GroundParams
-from gbas_ground.station import GroundEpoch, GroundStation, Monitored, StationState, initial_state
+from gbas_ground.station import GroundEpoch, GroundStation, StationReport, StationState
 from gbas_msgs_py.codes import EventKind, MonitorState
 from gbas_msgs_py.events import Event
 from gbas_msgs_py.joining import ReceptionQueue
@@ -107,9 +107,10 @@ def settle(params: WorldParams, station: GroundParams, quiet_s: float) -> Settle
     """
     world = World(replace(params, faults=(), fronts=()))
     count = round(quiet_s / params.interval_s)
-    state = initial_state(station)
+    state = GroundStation(station).initial_state()
     usable: tuple[str, ...] = ()
-    for state, monitored, _ in _steps(world, station, initial_state(station), range(count)):  # noqa: B007
+    for after, monitored, _ in _steps(world, station, state, range(count)):
+        state = after
         usable = tuple(_usable(monitored))
     return Settled(world=world, params=station, state=state, number=count, usable=usable)
 
@@ -166,7 +167,8 @@ def with_threats(world: World, threats: tuple[Threat, ...]) -> World:
 
 def _steps(
     world: World, station: GroundParams, state: StationState, numbers: range
-) -> Iterator[tuple[StationState, Monitored, tuple[Burst, ...]]]:
+) -> Iterator[tuple[StationState, StationReport, tuple[Burst, ...]]]:
+    ready = GroundStation(station)
     received: ReceptionQueue[Ephemeris] = ReceptionQueue()
     start_key = epoch_key(world.params.start_week, world.params.start_tow_s)
     first_key = start_key + round(numbers.start * world.params.interval_s * 1000.0)
@@ -178,23 +180,23 @@ def _steps(
         made = world.epoch(number)
         week, tow_s = from_epoch_key(made.key)
         epoch = GroundEpoch(gps_week=week, tow_s=tow_s, observations=made.ground, ephemerides=received.take(made.key))
-        state, monitored, bursts = GroundStation.step(state, epoch, station)
+        state, monitored, bursts = ready.step(state, epoch)
         yield state, monitored, bursts
 
 
-def _usable(monitored: Monitored) -> Iterator[str]:
+def _usable(monitored: StationReport) -> Iterator[str]:
     used = np.isfinite(monitored.integrity.prc_m[L1_100])
     return (name for name, index in SAT_INDEX.items() if used[index])
 
 
-def _told(subject: str, monitored: Monitored, bursts: tuple[Burst, ...]) -> bool:
+def _told(subject: str, monitored: StationReport, bursts: tuple[Burst, ...]) -> bool:
     """Whether users are told in this frame: no valid correction of the satellite, or none with the receiver in it."""
     if subject in SAT_INDEX:
         return not _sent_as_valid(bursts, subject)
     return any(event.kind == EventKind.EXCLUSION and _concerns(event.subject, subject) for event in monitored.events)
 
 
-def _failing(monitored: Monitored, satellite: str) -> Iterator[str]:
+def _failing(monitored: StationReport, satellite: str) -> Iterator[str]:
     """Monitors that fail a satellite."""
     rows = monitored.statistics.select(sat=satellite).rows()
     return (f"{row.monitor}/{row.test}" for row in rows if row.state is MonitorState.FAILED)

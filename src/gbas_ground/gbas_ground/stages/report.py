@@ -1,0 +1,148 @@
+"""Report: the tables of the epoch, and events of what came into use or went out of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gbas_core.record import BoolArray
+from gbas_core.satellites import SAT_IDS
+from gbas_ground.broadcast import empty_integrity
+from gbas_ground.executive.channel_table import channel_epoch
+from gbas_ground.executive.satellite_status import SatelliteStatus, integrity_of
+from gbas_ground.monitors.monitor_table import monitor_detail_epoch, monitor_epoch
+from gbas_ground.prepared import PreparedStation
+from gbas_ground.stages.correct import Corrected
+from gbas_ground.stages.decide import Decided
+from gbas_ground.stages.receive import GroundEpoch
+from gbas_msgs_py.codes import ChannelState, EventKind, ExclusionCause
+from gbas_msgs_py.events import Event, EventLog
+from gbas_msgs_py.records import ChannelEpoch, IntegrityEpoch, MonitorDetailEpoch, MonitorEpoch
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StationReport:
+    """What the station makes of one epoch, whatever happened.
+
+    Attributes
+    ----------
+    integrity : IntegrityEpoch
+        Corrections, and what may be broadcast of them.
+    statistics : MonitorEpoch
+        What every monitor said.
+    details : MonitorDetailEpoch
+        What is behind it.
+    channels : ChannelEpoch
+        State and cause of every receiver's channel of every satellite.
+    events : tuple of Event
+    """
+
+    integrity: IntegrityEpoch
+    statistics: MonitorEpoch
+    details: MonitorDetailEpoch
+    channels: ChannelEpoch
+    events: tuple[Event, ...]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ReportState:
+    """Memory of this stage: what was said at the epoch before.
+
+    Attributes
+    ----------
+    status : SatelliteStatus
+    contributing : (R,) bool array
+        Receivers behind the corrections.
+    serving : bool
+        Whether there were corrections.
+    channels : ChannelEpoch or None
+        The executive's table.
+    """
+
+    status: SatelliteStatus
+    contributing: BoolArray
+    serving: bool
+    channels: ChannelEpoch | None
+
+
+def report(state: ReportState, decided: Decided, station: PreparedStation) -> tuple[ReportState, StationReport]:
+    """Tables and events of one epoch."""
+    corrected, status = decided.corrected, decided.status
+    tracked, signals = corrected.monitored.tracked, corrected.monitored.signals
+    now = tracked.received.now
+    time = now.gps_week, now.tow_s
+    integrity = integrity_of(
+        *time,
+        tracked.received.known,
+        corrected.inputs,
+        corrected.corrections,
+        status,
+        signals.orbit_bound,
+        decided.protection,
+        station.params,
+    )
+    channels = channel_epoch(
+        *time,
+        tracked.tracked,
+        tracked.tracks,
+        corrected.inputs,
+        corrected.corrections,
+        status,
+        corrected.exclusions,
+        state.channels,
+    )
+    usable = status.state == ChannelState.USABLE
+    serving, contributing = bool(usable.any()), (corrected.corrections.used & usable).any(axis=1)
+    _contribution_events(state.contributing, contributing, corrected, now.events)
+    _satellite_events(state, decided, serving, now.events)
+    shown = np.isfinite(integrity.state)
+    summaries = {**tracked.summaries, **signals.summaries, **corrected.summaries}
+    made = StationReport(
+        integrity=integrity,
+        statistics=monitor_epoch(*time, summaries, shown),
+        details=monitor_detail_epoch(*time, signals.details, shown),
+        channels=channels,
+        events=now.events.all(),
+    )
+    return ReportState(status=status, contributing=contributing, serving=serving, channels=channels), made
+
+
+def refusal(epoch: GroundEpoch, events: EventLog) -> StationReport:
+    """Of an epoch that is not taken: nothing but the event."""
+    week, tow_s = epoch.gps_week, epoch.tow_s
+    return StationReport(
+        integrity=empty_integrity(week, tow_s),
+        statistics=MonitorEpoch(gps_week=week, tow_s=tow_s),
+        details=MonitorDetailEpoch(gps_week=week, tow_s=tow_s),
+        channels=ChannelEpoch(gps_week=week, tow_s=tow_s),
+        events=events.all(),
+    )
+
+
+def _contribution_events(before: BoolArray, contributing: BoolArray, corrected: Corrected, events: EventLog) -> None:
+    """Receivers that went out of the corrections, or came into them, without an event of their own."""
+    raw = corrected.monitored.tracked.received.raw
+    told = ~raw.present | corrected.exclusions.receivers.excluded
+    for row in np.flatnonzero(before & ~contributing & ~told):
+        events.add(EventKind.EXCLUSION, f"rr{row + 1}", "no_channels")
+    for row in np.flatnonzero(~before & contributing):
+        events.add(EventKind.READMISSION, f"rr{row + 1}", "used")
+
+
+def _satellite_events(state: ReportState, decided: Decided, serving: bool, events: EventLog) -> None:
+    """Satellites that came into use or went out of it, and the station with the first and the last of them."""
+    now, was = decided.status.state == ChannelState.USABLE, state.status.state == ChannelState.USABLE
+    told = {finding.subject for finding in decided.corrected.findings}
+    for satellite in np.flatnonzero(now != was):
+        subject = SAT_IDS[satellite]
+        if now[satellite]:
+            cause = ExclusionCause(int(state.status.cause[satellite]))
+            events.add(EventKind.READMISSION, subject, cause.word)
+        elif subject not in told:
+            cause = ExclusionCause(int(decided.status.cause[satellite])) or ExclusionCause.NOT_TRACKED
+            events.add(EventKind.EXCLUSION, subject, cause.word)
+    if serving != state.serving:
+        events.add(
+            EventKind.STATION, "station", "corrections_begin" if serving else "corrections_end", float(now.sum())
+        )
