@@ -39,7 +39,7 @@ def reach(package: str) -> set[str]:
 
 MAY_IMPORT = {package: reach(package) for package in DIRECTLY}
 # Rooms of a package (folders, and modules beside them), from the ground floor up: each may import those before it.
-# Parameters are not a room: every monitor's are declared in its module, and every room reads them.
+# Parameters, and a station prepared from them, are not a room: every room is given them.
 ROOMS = {
     "gbas_core": (
         "satellites",
@@ -66,10 +66,10 @@ ROOMS = {
         "claims",
         "exclusions",
         "consistency",
-        "monitoring",
         "long_term",
         "executive",
         "broadcast",
+        "stages",
         "station",
         "nodes",
     ),
@@ -99,7 +99,7 @@ ROOMS = {
         "nodes",
     ),
 }
-NO_ROOMS = {"params", "declared", "monitor_params", "approaches"}
+NO_ROOMS = {"params", "param_checks", "sections", "prepared", "approaches"}
 # Names of satellites and bands, and constants of nature.
 AXES = ("gbas_core.satellites", "gbas_core.signals")
 ROS_MODULES = {

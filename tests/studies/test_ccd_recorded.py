@@ -11,7 +11,8 @@ from gbas_core.ranging.divergence import GROUND
 from gbas_core.satellites import SAT_INDEX
 from gbas_core.signals import BANDS
 from gbas_ground.monitors.ccd import CcdParams
-from gbas_ground.monitors.ccd_f import TwoFrequencyParams, threshold
+from gbas_ground.monitors.ccd_f import TwoFrequencyParams
+from gbas_ground.monitors.divergence_forms import threshold
 from gbas_studies.ccd.empirical import cross_validated
 from gbas_studies.ccd.injected import ANTENNAS_M
 from gbas_studies.ccd.recorded import (

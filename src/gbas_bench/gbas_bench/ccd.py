@@ -13,12 +13,7 @@ from gbas_core.ranging.fault_modes import FAULT_MODES
 from gbas_core.satellites import N_SATS
 from gbas_core.signals import L1, L5, N_BANDS
 from gbas_ground.monitors.ccd import CcdParams, ccd_step, initial_ccd
-from gbas_ground.monitors.ccd_f import (
-    TwoFrequencyInput,
-    TwoFrequencyParams,
-    initial_two_frequency,
-    two_frequency_step,
-)
+from gbas_ground.monitors.ccd_f import TwoFrequencyInput, TwoFrequencyParams, initial_two_frequency, two_frequency_step
 from gbas_ground.monitors.divergence_classification import classify
 from gbas_studies.ccd.monitors import MONITORS
 from gbas_studies.ccd.smoothed_error import Smoothing

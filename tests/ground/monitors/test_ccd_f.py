@@ -13,15 +13,9 @@ from gbas_core.ranging.divergence import DivergenceParams
 from gbas_core.ranging.fault_modes import FAULT_MODES, fault_direction
 from gbas_core.satellites import N_SATS
 from gbas_core.signals import L1, L2, L5, N_BANDS, SPEED_OF_LIGHT_MPS
-from gbas_ground.monitors.ccd_f import (
-    TwoFrequencyInput,
-    TwoFrequencyParams,
-    initial_two_frequency,
-    sound_form,
-    threshold,
-    two_frequency_step,
-)
+from gbas_ground.monitors.ccd_f import TwoFrequencyInput, TwoFrequencyParams, initial_two_frequency, two_frequency_step
 from gbas_ground.monitors.divergence_covariance import PRINTED_COVARIANCE, StatisticCovariance
+from gbas_ground.monitors.divergence_forms import sound_form, threshold
 
 T_S = 0.5
 SEEN = (0, 3, 7, 12, 20, 33, 40, 50, 60)  # five GPS and four Galileo satellites

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
 from gbas_core.gnss.ephemeris import Ephemeris
 from gbas_core.gnss.frames import rot_enu_ecef
 from gbas_core.gnss.orbits import rotated_range, transmit_place
+from gbas_core.ranging.predicted_ranges import PredictedRanges
 from gbas_core.record import FloatArray
 from gbas_core.signals import L1
 from gbas_ground.params import GroundParams
@@ -39,15 +40,6 @@ def site_of(params: GroundParams) -> Site:
     """Positions of a station."""
     positions = np.concatenate([params.receiver_positions_m(), params.reference_point_m()[np.newaxis]])
     return Site(positions_m=positions, enu=rot_enu_ecef(params.station.latitude_rad, params.station.longitude_rad))
-
-
-class PredictedRanges(NamedTuple):
-    """Expected ranges and clocks ``(R, N)`` [m], [s]; elevations and azimuths at the reference point ``(N,)`` [rad]."""
-
-    range_m: FloatArray
-    clock_s: FloatArray
-    elevation_rad: FloatArray
-    azimuth_rad: FloatArray
 
 
 def predict_ranges(

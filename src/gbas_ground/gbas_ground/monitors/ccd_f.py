@@ -35,10 +35,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import numpy as np
-from scipy.special import chdtri
 
 from gbas_core.parameters import Derived, Parameter, ParameterError, parameters
-from gbas_core.ranging.combinations import divergence_free_cmc, iono_free_weights, ionosphere_free
+from gbas_core.ranging.combinations import divergence_free_cmc, ionosphere_free
 from gbas_core.ranging.divergence import (
     GROUND,
     DivergenceParams,
@@ -54,11 +53,18 @@ from gbas_core.signals import BAND_INDEX, L1, L5, SPEED_OF_LIGHT_MPS
 from gbas_ground.monitors.ccd import receiver_mean
 from gbas_ground.monitors.divergence_classification import MODES, NO_FAULT, classify
 from gbas_ground.monitors.divergence_covariance import (
-    PRINTED_COVARIANCE,
     StatisticCovariance,
     Triangle,
     matrix_of,
     triangle,
+)
+from gbas_ground.monitors.divergence_forms import (
+    DEGREES_OF_FREEDOM,
+    Form,
+    paper_form,
+    sound_form,
+    threshold,
+    with_iono_free_code,
 )
 from gbas_ground.monitors.expected_range import row_median
 from gbas_ground.monitors.false_alarm import exposure_probability, least_correlation
@@ -71,8 +77,6 @@ from gbas_msgs_py.monitors import CCD_F
 if TYPE_CHECKING:
     from gbas_ground.prepared import PreparedStation
 
-Form = Literal["paper", "sound"]
-DEGREES_OF_FREEDOM: Final[dict[Form, int]] = {"paper": 4, "sound": 3}
 # Known: obliquity 1 / sqrt(0.002 + sin^2 E). Source: ICAO Annex 10 Vol. I, App. B 3.6.5.3.
 _OBLIQUITY: Final = 0.002
 # Uncertain, ours: more satellites at once are no satellites' faults, and all of them fail.
@@ -82,12 +86,6 @@ _SUSPICION: Final = 0.5
 LARGEST_ZENITH_DELAY_M: Final = 5.0
 """Air has 2.2 to 2.8 m."""
 _ALL: Final = np.ones((1, N_SATS), dtype=bool)
-_PRINTED_INVERSE: Final = np.linalg.pinv(PRINTED_COVARIANCE)
-
-
-def threshold(form: Form, p_false_alarm: float) -> float:
-    """Quantile of chi-square: 47.8795 for the paper's four statistics at 1e-9, 44.84 for the three [-]."""
-    return float(chdtri(float(DEGREES_OF_FREEDOM[form]), p_false_alarm))
 
 
 @parameters
@@ -399,46 +397,6 @@ def _paper(means_mps: FloatArray, receivers: FloatArray, params: TwoFrequencyPar
     applies = (receivers > 0) & ((params.band, params.other) == (L1, L5))
     statistic = np.where(applies, paper_form(means_mps, receivers), np.nan)
     return upper_limit(statistic, threshold("paper", params.p_false_alarm), applies)
-
-
-def with_iono_free_code(rates_mps: FloatArray, band: int, other: int) -> FloatArray:
-    """The paper's four statistics (4, ..., N) from the three independent ones (3, ..., N).
-
-    Notes
-    -----
-    ``CMC_IF = gamma/(gamma-1) CMC_DF1 - 1/(gamma-1) CMC_DF5``, and filters and means are linear.
-    """
-    near, far = iono_free_weights(band, other)
-    code, other_code, carrier = rates_mps
-    return np.stack([code, other_code, near * code + far * other_code, carrier])
-
-
-def paper_form(means_mps: FloatArray, receivers: FloatArray) -> FloatArray:
-    """The paper's test metric with its printed covariance over M: ``M x^T pinv(Q) x`` [-].
-
-    Parameters
-    ----------
-    means_mps : (4, N) array
-    receivers : (N,) array
-        M.
-
-    Source: ENC 2015, eq (15) and (18).
-    """
-    return np.asarray(receivers * np.einsum("in,ij,jn->n", means_mps, _PRINTED_INVERSE, means_mps))
-
-
-def sound_form(rates_mps: FloatArray, covariance: FloatArray) -> FloatArray:
-    """``x^T Q^-1 x`` of the three independent statistics [-].
-
-    Parameters
-    ----------
-    rates_mps : (3, N) array
-    covariance : (N, 3, 3) array
-    """
-    known = np.asarray(np.isfinite(rates_mps).all(axis=0) & np.isfinite(covariance).all(axis=(1, 2)))
-    x = np.where(known, rates_mps, 0.0).T[..., np.newaxis]
-    solved = np.linalg.solve(np.where(known[:, np.newaxis, np.newaxis], covariance, np.eye(3)), x)
-    return np.where(known, (x * solved).sum(axis=(1, 2)), np.nan)
 
 
 def _divergence_free(epoch: TwoFrequencyInput, params: TwoFrequencyParams) -> FloatArray:

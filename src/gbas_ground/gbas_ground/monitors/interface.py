@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from gbas_core.ranging.predicted_ranges import PredictedRanges
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import CLOCK_GROUPS
 from gbas_core.signals import N_BANDS
@@ -25,7 +26,6 @@ from gbas_msgs_py.codes import ExclusionCause
 from gbas_msgs_py.monitors import Monitor
 
 if TYPE_CHECKING:
-    from gbas_ground.channels.predicted_ranges import PredictedRanges
     from gbas_ground.prepared import PreparedStation
 
 

@@ -7,9 +7,10 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from gbas_core.ranging.predicted_ranges import PredictedRanges
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.signals import L1, SPEED_OF_LIGHT_MPS
-from gbas_ground.channels.predicted_ranges import PredictedRanges, predict_ranges
+from gbas_ground.channels.predicted_ranges import predict_ranges
 from gbas_ground.channels.tracking import RawEpoch, TrackGroup, Tracks, track
 from gbas_ground.consistency import Exclusions
 from gbas_ground.corrections.formation import range_correction_m

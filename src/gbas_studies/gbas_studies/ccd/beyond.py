@@ -14,7 +14,7 @@ from gbas_core.ranging.fault_modes import FAULT_MODES, fault_direction
 from gbas_core.record import FloatArray
 from gbas_core.satellites import SAT_IDS
 from gbas_core.signals import L5
-from gbas_ground.monitors.ccd_f import threshold
+from gbas_ground.monitors.divergence_forms import threshold
 from gbas_studies.ccd.empirical import picture_of, table_2_items
 from gbas_studies.ccd.injected import (
     T_S,

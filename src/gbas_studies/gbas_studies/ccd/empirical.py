@@ -12,7 +12,7 @@ from gbas_core.ranging.divergence import GROUND, GROUND_THRESHOLD_MPS, Divergenc
 from gbas_core.record import FloatArray
 from gbas_core.satellites import SAT_IDS
 from gbas_core.signals import BANDS, L1
-from gbas_ground.monitors.ccd_f import threshold, with_iono_free_code
+from gbas_ground.monitors.divergence_forms import threshold, with_iono_free_code
 from gbas_studies.ccd.monitors import P_FALSE_ALARM
 from gbas_studies.ccd.recorded import (
     ONE_SECOND_SETS,

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from gbas_core.ranging.divergence import GROUND_SIGMA_MPS
 from gbas_core.ranging.fault_modes import FAULT_MODES
 from gbas_core.record import FloatArray
-from gbas_ground.monitors.ccd_f import threshold
+from gbas_ground.monitors.divergence_forms import threshold
 from gbas_studies.ccd.missed_detection import critical_mapping_gast_d, critical_mapping_gast_f, p_md, required_p_md
 from gbas_studies.ccd.monitors import P_FALSE_ALARM, Monitor, cmc_rate, monitor_for, one_sided_threshold_mps
 from gbas_studies.ccd.smoothed_error import Smoothing, Start, smoothed_cmc_s, unit_error_s

@@ -26,13 +26,11 @@ from gbas_ground.monitors.ccd_f import (
     TwoFrequencyParams,
     TwoFrequencyState,
     initial_two_frequency,
-    paper_form,
-    sound_form,
-    threshold,
     two_frequency_step,
 )
 from gbas_ground.monitors.divergence_classification import classify
 from gbas_ground.monitors.divergence_covariance import StatisticCovariance
+from gbas_ground.monitors.divergence_forms import paper_form, sound_form, threshold
 from gbas_sim.atmosphere.fronts import WedgeFront
 from gbas_sim.atmosphere.ionosphere import IonosphereParams
 from gbas_sim.atmosphere.troposphere import Troposphere

@@ -14,7 +14,7 @@ from scipy.optimize import minimize_scalar
 from scipy.special import chndtr, chndtrinc, ndtr, ndtri
 
 from gbas_core.record import FloatArray
-from gbas_ground.monitors.ccd_f import DEGREES_OF_FREEDOM, Form, threshold
+from gbas_ground.monitors.divergence_forms import DEGREES_OF_FREEDOM, Form, threshold
 from gbas_studies.ccd.monitors import Monitor
 
 # Known: limit case of the GAST D range domain requirement.

@@ -16,8 +16,8 @@ from gbas_core.ranging.divergence import GROUND, GROUND_SIGMA_MPS, GROUND_THRESH
 from gbas_core.ranging.fault_modes import FAULT_MODES, fault_direction
 from gbas_core.record import FloatArray
 from gbas_core.signals import L1, L5
-from gbas_ground.monitors.ccd_f import threshold
 from gbas_ground.monitors.divergence_covariance import INDEPENDENT, PRINTED_COVARIANCE, published_by_origin
+from gbas_ground.monitors.divergence_forms import threshold
 from gbas_studies.ccd.smoothed_error import StudyError
 
 MonitorName = Literal["gast-d", "gast-f-paper", "gast-f-sound"]

@@ -24,8 +24,8 @@ from gbas_core.ranging.divergence import DivergenceParams, divergence_step, init
 from gbas_core.ranging.fault_modes import fault_direction
 from gbas_core.record import FloatArray
 from gbas_core.signals import L1, L5
-from gbas_ground.monitors.ccd_f import threshold
 from gbas_ground.monitors.divergence_covariance import INDEPENDENT
+from gbas_ground.monitors.divergence_forms import threshold
 
 COLUMNS: Final[FloatArray] = combination_matrix(L1, L5)[list(INDEPENDENT)]
 # Epochs from rest to settled in time constants: what is missing then is below 1e-6 of the noise.

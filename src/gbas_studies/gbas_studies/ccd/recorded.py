@@ -24,14 +24,9 @@ from gbas_ground.channels import ephemerides as station_ephemerides
 from gbas_ground.channels.predicted_ranges import predict_ranges, site_of
 from gbas_ground.channels.tracking import stack
 from gbas_ground.monitors.ccd import CcdParams, ccd_step, initial_ccd
-from gbas_ground.monitors.ccd_f import (
-    TwoFrequencyInput,
-    TwoFrequencyParams,
-    initial_two_frequency,
-    sound_form,
-    two_frequency_step,
-)
+from gbas_ground.monitors.ccd_f import TwoFrequencyInput, TwoFrequencyParams, initial_two_frequency, two_frequency_step
 from gbas_ground.monitors.divergence_covariance import Calibration, StatisticCovariance, calibrate
+from gbas_ground.monitors.divergence_forms import sound_form
 from gbas_ground.params import GroundParams
 from gbas_msgs_py.joining import ReceptionQueue
 

@@ -15,7 +15,7 @@ from gbas_core.ranging.divergence import (
     GROUND_THRESHOLD_MPS,
     ramp_response,
 )
-from gbas_ground.monitors.ccd_f import threshold
+from gbas_ground.monitors.divergence_forms import threshold
 from gbas_studies.ccd.missed_detection import (
     FREE_M,
     critical_mapping_gast_d,
