@@ -15,14 +15,17 @@ from gbas_msgs_py import tables, topics
 from gbas_msgs_py.events import Event, EventKind
 from gbas_msgs_py.records import ServiceType, SolutionEpoch
 from gbas_msgs_py.ros import fix_from_solution
-from gbas_node.node import ConfiguredParams, GbasNode, run
+from gbas_node.node import GbasNode, run
+from gbas_node.params import ConfiguredParams
 
 
 class ProtectionLevel(GbasNode):
     """Runs :meth:`AirborneReceiver.protect`; says that there is no service when solutions cease."""
 
+    params_type = ConfiguredParams
+
     def __init__(self, **kwargs: Any) -> None:
-        super().__init__("protection_level", ConfiguredParams, **kwargs)
+        super().__init__("protection_level", **kwargs)
         self.receiver = receiver_params(self, self.params.config)
         self.state = ServiceState()
         self.service_told = int(ServiceType.NONE)
