@@ -52,7 +52,7 @@ def test_a_running_node_describes_its_parameters(positioning: Answers) -> None:
     assert mask.floating_point_range[0].step == 0.0
     assert (rpds.integer_range[0].from_value, rpds.integer_range[0].to_value, rpds.integer_range[0].step) == (-1, 48, 1)
     assert aad.additional_constraints == "one of 'A', 'B'"
-    assert not (unhealthy.floating_point_range or unhealthy.integer_range or unhealthy.additional_constraints)
+    assert not [*unhealthy.floating_point_range, *unhealthy.integer_range, *unhealthy.additional_constraints]
     assert timeout.floating_point_range[0].to_value == 3600.0
     assert timeout.description.endswith(" [s]")
     assert all(each.read_only for each in (mask, rpds, aad, unhealthy, timeout))
