@@ -128,11 +128,11 @@ def test_every_site_file_is_read_by_those_it_is_for() -> None:
     station, receiver, world = GroundParams.from_yaml(path), AirborneParams.from_yaml(path), scenario_from_yaml(path)
     assert station.n_receivers == 4
     assert receiver.rpds == station.approaches[0].rpds
-    assert world.receiver_ecef_m == station.receiver_ecef_m
+    assert world.receiver_ecef_m == station.receivers.ecef_m
     # Published antenna positions of three of the receivers.
     published = [[3840619.039, 715604.228, 5024909.863], [3840835.113, 714861.969, 5024848.587]]
     published.append([3841202.939, 715429.959, 5024488.675])
-    assert [list(place) for place in station.receiver_ecef_m[:3]] == published
+    assert [list(place) for place in station.receivers.ecef_m[:3]] == published
 
 
 def test_configurations_that_come_along_are_ros_parameter_files() -> None:

@@ -31,10 +31,10 @@ def test_nothing_is_claimed_that_is_not_monitored(name: str, station: GroundPara
     if claim.source == "none":
         assert claim.at_zenith == claim.at_mask == pytest.approx(MAX_DECORRELATION)
     assert claim.source != "external"  # none is known of any site the suite ships
-    assert station.gcid in (GCID_UNHEALTHY, supported_gcid(station))
-    if not station.gast_d:
-        assert (station.y_eig_m, station.m_eig) == (MAX_Y_EIG_M, MAX_M_EIG)
-    assert station.sigma_vert_iono_gradient in (NOMINAL_SIGMA_VIG, MAX_SIGMA_VIG), name
+    assert station.station.gcid in (GCID_UNHEALTHY, supported_gcid(station))
+    if not station.gast_d.enabled:
+        assert (station.gast_d.y_eig_m, station.gast_d.m_eig) == (MAX_Y_EIG_M, MAX_M_EIG)
+    assert station.atmosphere.sigma_vert_iono_gradient in (NOMINAL_SIGMA_VIG, MAX_SIGMA_VIG), name
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])

@@ -110,7 +110,7 @@ def test_station_data_and_approach_are_sent(tmp_path):
     assert sets[0].fas.ltp_latitude_rad == pytest.approx(approach.ltp_lat_rad, abs=np.radians(0.0005 / 3600))
     last = station_data[-1]
     assert last.n_reference_receivers == 3
-    assert last.latitude_rad == pytest.approx(station.latitude_rad, abs=np.radians(0.0005 / 3600))
+    assert last.latitude_rad == pytest.approx(station.station.latitude_rad, abs=np.radians(0.0005 / 3600))
 
 
 def test_station_that_cannot_serve_says_so_and_stays_on_the_air():

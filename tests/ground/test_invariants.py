@@ -52,12 +52,12 @@ def check(integrity, station):
     usable = integrity.state == ChannelState.USABLE
     for name in ("prc_100_m", "prc_30_m", "rrc_100_mps", "rrc_30_mps", "sigma_pr_gnd_m", "sigma_pr_gnd_30_m"):
         assert np.array_equal(np.isfinite(getattr(integrity, name)), usable), name
-    assert (np.abs(integrity.prc_100_m[usable]) <= station.max_prc_m).all()
-    assert (np.abs(integrity.rrc_30_mps[usable]) <= station.max_rrc_mps).all()
+    assert (np.abs(integrity.prc_100_m[usable]) <= station.correction_limits.max_prc_m).all()
+    assert (np.abs(integrity.rrc_30_mps[usable]) <= station.correction_limits.max_rrc_mps).all()
     assert (integrity.cause[usable] == ExclusionCause.NONE).all()
-    assert (integrity.elevation_rad[usable] >= station.elevation_mask_rad).all()
+    assert (integrity.elevation_rad[usable] >= station.monitors.elevation_mask_rad).all()
     used = integrity.receiver_used[: station.n_receivers, usable] == 1.0
-    assert (used.sum(axis=0) >= station.min_receivers).all()
+    assert (used.sum(axis=0) >= station.receivers.minimum).all()
     b = integrity.b_m[: station.n_receivers, usable]
     several = used.sum(axis=0) >= 2
     assert np.array_equal(np.isfinite(b), used & several)
@@ -78,7 +78,7 @@ def check(integrity, station):
 def test_invariants_under_random_damage(ranges, seed, receivers, rate, settle_s):
     rng = np.random.default_rng(seed)
     station = params(
-        receivers, settle_time_s=settle_s, readmission_time_s=2.0, tau_s=(5.0, 2.0), gast_d=True, slots="ABC"
+        receivers, smoothing__settle_time_s=settle_s, monitors__readmission_time_s=2.0, smoothing__tau_s=(5.0, 2.0), gast_d__enabled=True, vdb__slots="ABC"
     )
     state = initial_state(station)
     ephemeris = WORLDS[receivers].ephemeris

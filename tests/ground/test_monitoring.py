@@ -99,7 +99,7 @@ def test_carriers_that_differ_over_a_baseline():
     """A third of a wavelength on one of two receivers, since before the start: nothing but the gradient shows it."""
     shifted = np.zeros((2, N_SATS))
     shifted[1, G02] = 0.06
-    station = params(2, refractivity=16.0)  # the ranges have no troposphere
+    station = params(2, atmosphere__refractivity=16.0)  # the ranges have no troposphere
     out = run(truth(2), station, half_seconds(30), code_error_m=lambda _: 0.0, carrier_error_m=lambda _: shifted)
     causes, event = excluded_by(out)
     assert causes == {"ionosphere_gradient", "ephemeris_residual"}
@@ -129,7 +129,7 @@ def test_a_satellite_that_cannot_be_judged_yet_is_not_used():
 
 def test_data_too_slow_for_a_required_monitor_are_never_used():
     """Every 4 s: the acceleration monitor has two epochs in its window of 5 s."""
-    station = params(4, max_gap_s=10.0)
+    station = params(4, smoothing__max_gap_s=10.0)
     out = run(truth(4), station, 4.0 * np.arange(20))
     assert (out.array("state")[:, G02] != ChannelState.USABLE).all()
     assert out.integrity[-1].cause[G02] == ExclusionCause.UNMONITORED
@@ -145,7 +145,7 @@ def test_service_type_d_needs_the_gradient_monitor():
     out = run(truth(1), params(1, **one), half_seconds(30))
     assert (out.array("state")[:, G02] != ChannelState.USABLE).all()
     assert out.integrity[-1].cause[G02] == ExclusionCause.UNMONITORED
-    assert run(truth(1), params(1, min_receivers=1), half_seconds(30)).integrity[-1].state[G02] == ChannelState.USABLE
+    assert run(truth(1), params(1, receivers__minimum=1), half_seconds(30)).integrity[-1].state[G02] == ChannelState.USABLE
 
 
 def test_a_quiet_station_passes_everything_and_every_table_can_be_sent():

@@ -39,16 +39,16 @@ def test_smallest_configuration_claims_nothing():
     assert message.refractivity_uncertainty == 255.0
     assert message.adb1.k_md_e_c_gps == 12.75
     assert (
-        station.p_ephemeris == station.p_ephemeris_d == 0.0
+        station.ephemeris.p == station.ephemeris.p_d == 0.0
     )  # no claim: one receiver's is the largest, test_orbit_claim
-    assert station.accuracy_designator == "A"
+    assert station.accuracy.designator == "A"
     assert message.n_reference_receivers is None
 
 
 def test_angles_are_degrees_in_files_only():
     station = GroundParams.from_mapping(changed(monitors={"elevation_mask_deg": 7.5}))
-    assert station.latitude_rad == pytest.approx(math.radians(52.32), abs=1e-15)
-    assert station.elevation_mask_rad == pytest.approx(math.radians(7.5), abs=1e-15)
+    assert station.station.latitude_rad == pytest.approx(math.radians(52.32), abs=1e-15)
+    assert station.monitors.elevation_mask_rad == pytest.approx(math.radians(7.5), abs=1e-15)
     assert GroundParams.from_mapping(MINIMAL).elevation_mask_rad == pytest.approx(math.radians(5.0), abs=1e-15)
 
 
@@ -172,7 +172,7 @@ def test_every_field_is_described_once():
 
 
 def test_messages_of_a_full_station():
-    station = params(4, gast_d=True, authentication=True, slots="AC", max_use_distance_m=0.0, rsds=3)
+    station = params(4, gast_d__enabled=True, vdb__authentication=True, vdb__slots="AC", station__max_use_distance_m=0.0, station__rsds=3)
     message = station.station_message()
     assert isinstance(message, Type2)
     assert message.n_reference_receivers == 4
@@ -185,7 +185,7 @@ def test_messages_of_a_full_station():
 def test_reference_point_and_receivers():
     station = params(3)
     latitude, longitude, height = geodetic_from_ecef(station.reference_point_m())
-    assert (latitude, longitude) == pytest.approx((station.latitude_rad, station.longitude_rad), abs=1e-12)
-    assert height == pytest.approx(station.height_m, abs=1e-6)  # rounding of 6e6 m through the transformation
+    assert (latitude, longitude) == pytest.approx((station.station.latitude_rad, station.station.longitude_rad), abs=1e-12)
+    assert height == pytest.approx(station.station.height_m, abs=1e-6)  # rounding of 6e6 m through the transformation
     assert station.receiver_positions_m().shape == (3, 3)
     assert np.linalg.norm(station.receiver_positions_m() - station.reference_point_m(), axis=1).max() < 600.0

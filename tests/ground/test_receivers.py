@@ -72,9 +72,9 @@ def watched(world, station, change=lambda observed: observed, seconds=23.0, onse
 
 def moved(station, receiver, enu_m):
     """The station with one antenna surveyed wrong."""
-    position = np.array(station.receiver_ecef_m[receiver])
-    position = position + enu_m @ rot_enu_ecef(station.latitude_rad, station.longitude_rad)
-    places = list(station.receiver_ecef_m)
+    position = np.array(station.receivers.ecef_m[receiver])
+    position = position + enu_m @ rot_enu_ecef(station.station.latitude_rad, station.station.longitude_rad)
+    places = list(station.receivers.ecef_m)
     places[receiver] = tuple(float(each) for each in position)
     return replace(station, receiver_ecef_m=tuple(places))
 
@@ -143,7 +143,7 @@ def test_two_receivers_in_each_others_place_are_named(world, station):
 @pytest.mark.parametrize("count", [2, 3])
 def test_two_or_three_receivers_do_not_tell_which_is_wrong(world, station, count):
     """Then it is the satellites: whatever the receivers have, none is used that does not fit."""
-    fewer = moved(replace(station, receiver_ecef_m=station.receiver_ecef_m[:count]), 1, np.array([0.12, 0.0, 0.0]))
+    fewer = moved(replace(station, receiver_ecef_m=station.receivers.ecef_m[:count]), 1, np.array([0.12, 0.0, 0.0]))
     usable, _, told = watched(world, fewer, lambda seen: seen[:count])
     assert not [subject for _, subject, _ in told if subject.startswith("rr")]
     assert {cause for _, _, cause in told} <= {"ionosphere_gradient", "ephemeris_residual", "too_few_common_satellites"}
@@ -153,7 +153,7 @@ def test_two_or_three_receivers_do_not_tell_which_is_wrong(world, station, count
 def _slope(station, size, course_rad, satellites):
     """Delays (R, N) of a gradient over the site on some satellites [m]."""
     enu = (station.receiver_positions_m() - station.reference_point_m()) @ rot_enu_ecef(
-        station.latitude_rad, station.longitude_rad
+        station.station.latitude_rad, station.station.longitude_rad
     ).T
     along = enu[:, 0] * np.sin(course_rad) + enu[:, 1] * np.cos(course_rad)
     delay = np.zeros((4, N_SATS))
@@ -217,7 +217,7 @@ def _excluded(out):
 
 def test_what_is_excluded_stays_out_until_it_is_well_below_its_threshold():
     """A third of a wavelength on one receiver, since before the start, that shrinks slowly to a share of it."""
-    station = params(2, refractivity=16.0, readmission_time_s=5.0)
+    station = params(2, atmosphere__refractivity=16.0, monitors__readmission_time_s=5.0)
     start = run(
         truth(2), station, half_seconds(14), code_error_m=lambda _: 0.0, carrier_error_m=_difference(lambda _: 0.06)
     )

@@ -25,17 +25,17 @@ GARR_M = (4796983.5094, 160309.1219, 4187340.3440)
 def station_at(positions_m, **changes):
     latitude, longitude, height = (float(value) for value in geodetic_from_ecef(np.array(positions_m[0])))
     chosen = {
-        "station_id": "TEST",
-        "latitude_rad": latitude,
-        "longitude_rad": longitude,
-        "height_m": height,
-        "receiver_ecef_m": tuple(tuple(each) for each in positions_m),
-        "min_receivers": min(2, len(positions_m)),
-        "require_cn0": False,
-        "slots": "AB",
-        "gcid": 1,
+        "station.id": "TEST",
+        "station.latitude_rad": latitude,
+        "station.longitude_rad": longitude,
+        "station.height_m": height,
+        **receiver_values(np.array(positions_m)),
+        "receivers.minimum": min(2, len(positions_m)),
+        "signal_power.require_cn0": False,
+        "vdb.slots": "AB",
+        "station.gcid": 1,
     }
-    return GroundParams(**(chosen | changes))
+    return made_of(GroundParams, chosen | {name.replace("__", "."): value for name, value in changes.items()})
 
 
 def run(recording, station, first=0, last=None):
@@ -120,7 +120,7 @@ def test_faulty_ephemeris_of_g17_never_comes_into_use(data_dir, faulty):
     midnight = int(recording.keys[0])
     integrity, events = run(
         recording,
-        station_at((GARR_M,), max_gap_s=45.0, monitors=watching_monitors()),  # a file of 30 s: too slow for them
+        station_at((GARR_M,), smoothing__max_gap_s=45.0, monitors=watching_monitors()),  # a file of 30 s: too slow for them
         first=midnight + 17 * 3_600_000,
         last=midnight + 20 * 3_600_000,
     )
@@ -138,7 +138,7 @@ def test_gps_and_galileo(data_dir, name):
     recording = Recording.open(
         [data_dir / path for path in chosen["ground"]], None, [data_dir / path for path in chosen["navigation"]]
     )
-    station = station_at(chosen["ground_xyz_m"], systems="GE", require_cn0=True)
+    station = station_at(chosen["ground_xyz_m"], station__systems="GE", signal_power__require_cn0=True)
     integrity, _ = run(recording, station, last=int(recording.keys[0]) + 260_000)
     usable = stacked(integrity, "state") == ChannelState.USABLE
     assert usable[-1, :32].sum() >= 6

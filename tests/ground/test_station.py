@@ -83,7 +83,7 @@ def test_b_values_of_a_bias():
 
 
 def test_nothing_is_usable_before_the_filters_have_settled():
-    out = run(truth(2), params(2, settle_time_s=8.0), half_seconds(24))
+    out = run(truth(2), params(2, smoothing__settle_time_s=8.0), half_seconds(24))
     states = out.array("state")
     here = np.isfinite(states[-1]) & (states[-1] == ChannelState.USABLE)
     first = 16  # at 8.0 s
@@ -114,7 +114,7 @@ def step_on(receivers, receiver, satellite, size, begin, end=np.inf):
 
 def test_faulty_channel_is_excluded_and_comes_back_after_the_clear_time():
     """8 m of multipath on one channel, below the 10 m at which a code jump restarts the filter."""
-    station = params(3, tau_s=(2.0, 2.0), readmission_time_s=10.0, accuracy_designator="C")
+    station = params(3, smoothing__tau_s=(2.0, 2.0), monitors__readmission_time_s=10.0, accuracy__designator="C")
     out = run(
         truth(3),
         station,
@@ -142,7 +142,7 @@ def test_faulty_channel_is_excluded_and_comes_back_after_the_clear_time():
 
 
 def test_excluded_channel_leaves_no_trace_in_the_corrections():
-    station = params(4, tau_s=(2.0, 2.0))
+    station = params(4, smoothing__tau_s=(2.0, 2.0))
     quiet = lambda _: 0.0  # noqa: E731
     error = step_on(4, 0, "G02", 9.0, 10.0)
     out = run(truth(4), station, half_seconds(80), code_error_m=error, carrier_error_m=quiet)
@@ -154,7 +154,7 @@ def test_excluded_channel_leaves_no_trace_in_the_corrections():
 
 
 def test_two_receivers_exclude_the_satellite_and_bring_it_back():
-    station = params(2, tau_s=(2.0, 2.0), readmission_time_s=10.0, accuracy_designator="C")
+    station = params(2, smoothing__tau_s=(2.0, 2.0), monitors__readmission_time_s=10.0, accuracy__designator="C")
     out = run(
         truth(2),
         station,
@@ -187,7 +187,7 @@ def test_receiver_with_several_faults_is_excluded_whole():
             result[3, faulty] = [9.0, -9.0, 8.0, -9.5]
         return result
 
-    station = params(4, tau_s=(2.0, 2.0), receiver_fault_channels=3, readmission_time_s=10.0)
+    station = params(4, smoothing__tau_s=(2.0, 2.0), monitors__receiver_fault_channels=3, monitors__readmission_time_s=10.0)
     out = run(truth(4), station, half_seconds(120), code_error_m=error, carrier_error_m=lambda _: 0.0)
     told = out.told("receiver_fault")
     assert [event[1:] for event in told] == [("exclusion", "rr4"), ("readmission", "rr4")]
@@ -213,7 +213,7 @@ def test_exclusions_that_leave_no_clock_still_end():
 
     in_view = np.flatnonzero(np.isfinite(truth(2).range_m(WEEK, TOW_S)).all(axis=0) & IS_GPS)
     station = params(
-        2, systems="G", tau_s=(2.0, 2.0), readmission_time_s=10.0, accuracy_designator="C", min_common_satellites=5
+        2, station__systems="G", smoothing__tau_s=(2.0, 2.0), monitors__readmission_time_s=10.0, accuracy__designator="C", monitors__min_common_satellites=5
     )
     out = run(truth(2), station, half_seconds(120), code_error_m=error, carrier_error_m=lambda _: 0.0)
     count = (out.array("state") == ChannelState.USABLE).sum(axis=1)
@@ -227,7 +227,7 @@ def test_correction_limit(sign):
     """A satellite 400 m off (its clock ran away): only this one is excluded, although the mean moves all the others."""
     error = np.zeros(N_SATS)
     error[SAT_INDEX["G02"]] = sign * 400.0
-    station = params(3, max_range_residual_m=1000.0)
+    station = params(3, expected_range__max_residual_m=1000.0)
     last = run(truth(3), station, half_seconds(20), code_error_m=lambda _: error).integrity[-1]
     assert last.cause[SAT_INDEX["G02"]] == ExclusionCause.PRC_LIMIT
     assert np.isnan(last.prc_100_m[SAT_INDEX["G02"]])
@@ -239,7 +239,7 @@ def test_correction_limit(sign):
 def test_rate_limit():
     error = lambda second: np.where(np.arange(N_SATS) == SAT_INDEX["G02"], 5.0 * second, 0.0)  # noqa: E731
     # 5 m/s would be taken for a slip against the known range; here it is a rate both code and carrier have
-    station = params(3, settle_time_s=0.0, monitors=watching_monitors())
+    station = params(3, smoothing__settle_time_s=0.0, monitors=watching_monitors())
     out = run(truth(3), station, half_seconds(20), code_error_m=error)
     told = out.told("rrc_limit")
     assert told[0][1:] == ("exclusion", "G02")
@@ -248,7 +248,7 @@ def test_rate_limit():
 
 
 def test_gross_error_of_one_channel_never_enters_the_corrections():
-    station = params(4, readmission_time_s=10.0)
+    station = params(4, monitors__readmission_time_s=10.0)
     out = run(truth(4), station, half_seconds(100), code_error_m=step_on(4, 0, "G02", 5000.0, 10.0, 11.0))
     told = out.told("range_residual")
     assert [event[1:] for event in told] == [("exclusion", "rr1/G02"), ("readmission", "rr1/G02")]
@@ -302,7 +302,7 @@ def test_files_without_cn0_are_used_when_told_so():
 
     out = run(truth(2), params(2), half_seconds(20), change=without)
     assert not usable(out.integrity[-1]).any()
-    out = run(truth(2), params(2, require_cn0=False), half_seconds(20), change=without)
+    out = run(truth(2), params(2, signal_power__require_cn0=False), half_seconds(20), change=without)
     assert usable(out.integrity[-1]).any()
 
 
@@ -399,7 +399,7 @@ def test_receiver_missing_for_an_epoch_keeps_its_filters():
         return (observed[0], None, observed[2]) if second in (10.0, 12.0, 12.5) else observed
 
     error = np.random.default_rng(0).normal(0.0, 5.0, N_SATS)
-    out = run(truth(3), params(3, settle_time_s=5.0), half_seconds(40), change=drop, code_error_m=lambda _: error)
+    out = run(truth(3), params(3, smoothing__settle_time_s=5.0), half_seconds(40), change=drop, code_error_m=lambda _: error)
     seconds, receivers = np.array(out.seconds), out.array("n_receivers")
     away = np.isin(seconds, [10.0, 12.0, 12.5])
     assert (receivers[away] == 2.0).all()
@@ -416,7 +416,7 @@ def test_receiver_missing_too_long_starts_anew():
     def drop(second, observed):
         return (observed[0], None, observed[2]) if 10.0 <= second < 14.0 else observed
 
-    out = run(truth(3), params(3, settle_time_s=5.0, max_gap_s=3.5), half_seconds(60), change=drop)
+    out = run(truth(3), params(3, smoothing__settle_time_s=5.0, smoothing__max_gap_s=3.5), half_seconds(60), change=drop)
     seconds, receivers = np.array(out.seconds), out.array("n_receivers")
     assert (receivers[(seconds >= 10.0) & (seconds < 19.0)] == 2.0).all()
     assert (receivers[seconds >= 19.0] == 3.0).all()
@@ -454,11 +454,11 @@ def test_bad_numbers_never_reach_a_correction(field, bad):
 
 @pytest.mark.parametrize("systems", ["G", "E", "GE"])
 def test_systems(systems):
-    out = run(truth(3, systems=systems), params(3, systems=systems), half_seconds(20))
+    out = run(truth(3, systems=systems), params(3, station__systems=systems), half_seconds(20))
     now = usable(out.integrity[-1])
     assert (now & IS_GPS).any() == ("G" in systems)
     assert (now & IS_GALILEO).any() == ("E" in systems)
-    only = run(truth(3), params(3, systems=systems), half_seconds(20)).integrity[-1]
+    only = run(truth(3), params(3, station__systems=systems), half_seconds(20)).integrity[-1]
     assert np.array_equal(usable(only), now)
 
 

@@ -56,8 +56,8 @@ def shipped_stations() -> Iterator[tuple[str, GroundParams]]:
 
 def row(name: str, station: GroundParams) -> str:
     """One line of the table."""
-    claim, sigma = orbit_claim(station), station.sigma_vert_iono_gradient
-    gradients = f"{station.y_eig_m:g} m, {1e3 * station.m_eig:g} m/km" if station.gast_d else "no type D"
+    claim, sigma = orbit_claim(station), station.atmosphere.sigma_vert_iono_gradient
+    gradients = f"{station.gast_d.y_eig_m:g} m, {1e3 * station.gast_d.m_eig:g} m/km" if station.gast_d.enabled else "no type D"
     cells = (
         name,
         str(station.n_receivers),
@@ -65,7 +65,7 @@ def row(name: str, station: GroundParams) -> str:
         SOURCES[claim.source],
         f"{1e6 * sigma:g} mm/km, {'largest' if sigma >= MAX_SIGMA_VIG else 'declared'}",
         gradients,
-        str(station.gcid),
+        str(station.station.gcid),
         str(supported_gcid(station)),
     )
     return f"| {' | '.join(cells)} |"

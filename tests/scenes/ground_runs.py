@@ -11,8 +11,8 @@ import numpy as np
 from gbas_core.gnss.ephemeris import Ephemeris
 from gbas_core.gnss.gpstime import add_seconds
 from gbas_core.gnss.observations import ObservationEpoch
+from gbas_core.parameters import made_of
 from gbas_core.record import FloatArray
-from gbas_ground.monitor_params import MonitorParams
 from gbas_ground.params import GroundParams
 from gbas_ground.station import GroundEpoch, GroundStation, StationState, initial_state
 from gbas_msgs_py.events import Event
@@ -25,27 +25,27 @@ Change = Callable[[float, Observed], Observed]
 """What a test does to the observations, given the seconds since the start."""
 
 
+def receiver_values(positions_m: FloatArray) -> dict[str, Any]:
+    """Antennas as parameters, by their names."""
+    return {f"receivers.rr{row}_ecef_m": tuple(place) for row, place in enumerate(positions_m.tolist(), start=1)}
+
+
 def params(receivers: int = 4, **changes: Any) -> GroundParams:
-    """A healthy station with quick filters; `changes` are fields of the parameters."""
+    """A healthy station with quick filters; `changes` are fields, ``section__name``, or sections."""
     chosen: dict[str, Any] = {
-        "station_id": "TEST",
-        "latitude_rad": float(LATITUDE_RAD),
-        "longitude_rad": float(LONGITUDE_RAD),
-        "height_m": HEIGHT_M,
-        "gcid": 1,
-        "systems": "GE",
-        "receiver_ecef_m": tuple(tuple(each) for each in receiver_positions_m(receivers).tolist()),
-        "min_receivers": min(2, receivers),
-        "slots": "AB",
-        "settle_time_s": 5.0,
-        "readmission_time_s": 10.0,
+        "station.id": "TEST",
+        "station.latitude_rad": float(LATITUDE_RAD),
+        "station.longitude_rad": float(LONGITUDE_RAD),
+        "station.height_m": HEIGHT_M,
+        "station.gcid": 1,
+        "station.systems": "GE",
+        **receiver_values(receiver_positions_m(receivers)),
+        "receivers.minimum": min(2, receivers),
+        "vdb.slots": "AB",
+        "smoothing.settle_time_s": 5.0,
+        "monitors.readmission_time_s": 10.0,
     }
-    return GroundParams(**(chosen | changes))
-
-
-def watching_monitors() -> MonitorParams:
-    """Monitors of signals that exclude nothing, so that others can be seen alone."""
-    return MonitorParams().watching()
+    return made_of(GroundParams, chosen | {name.replace("__", "."): value for name, value in changes.items()})
 
 
 @dataclass

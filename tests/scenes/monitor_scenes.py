@@ -59,11 +59,12 @@ class MonitorEpoch(NamedTuple):
 def station_of(positions_m: FloatArray, systems: str) -> GroundParams:
     """A station with its reference point at the first receiver."""
     latitude, longitude, height = (float(value) for value in geodetic_from_ecef(np.array(positions_m[0])))
-    return GroundParams(
-        station_id="TEST", latitude_rad=latitude, longitude_rad=longitude, height_m=height, systems=systems,
-        receiver_ecef_m=tuple(tuple(float(value) for value in each) for each in positions_m),
-        min_receivers=1, require_cn0=False, slots="AB", gcid=1, ephemeris_settle_s=0.0,
-    )  # fmt: skip
+    return made_of(GroundParams, {
+        "station.id": "TEST", "station.latitude_rad": latitude, "station.longitude_rad": longitude,
+        "station.height_m": height, "station.systems": systems, "station.gcid": 1,
+        **receiver_values(np.array(positions_m)), "receivers.minimum": 1, "signal_power.require_cn0": False,
+        "vdb.slots": "AB", "ephemeris.settle_s": 0.0,
+    })  # fmt: skip
 
 
 def braunschweig_station(count: int = 4, **sections: Mapping[str, Any]) -> GroundParams:
@@ -89,7 +90,7 @@ def monitor_epochs(
         for each in received:
             known, _ = ephemerides.receive(known, each, week, tow_s, params)
         known, changed, _ = ephemerides.choose(known, week, tow_s, params)
-        raw = stack(observations, satellites_of(params.systems))
+        raw = stack(observations, satellites_of(params.station.systems))
         predicted = predict_ranges(known.current, week, tow_s, raw.code_m[:, L1], site)
         less_clock = predicted.range_m - SPEED_OF_LIGHT_MPS * predicted.clock_s
         old = predict_ranges(before, week, tow_s, raw.code_m[:, L1], site)
@@ -99,7 +100,7 @@ def monitor_epochs(
         _, los = rotated_range(
             site.positions_m[-1], predicted_state(known.current, week, tow_s, site.positions_m[-1]).position_m
         )
-        azimuths, _ = azimuth_elevation(rot_enu_ecef(params.latitude_rad, params.longitude_rad) @ los)
+        azimuths, _ = azimuth_elevation(rot_enu_ecef(params.station.latitude_rad, params.station.longitude_rad) @ los)
         yield MonitorEpoch(
             key, raw.code_m, raw.carrier_m, raw.cn0_dbhz,
             np.repeat((tracks.age_s == 0.0)[:, np.newaxis], raw.code_m.shape[1], axis=1),

@@ -103,7 +103,7 @@ def test_a_day_of_satellites(day):
     # GPS and Galileo, 24 each, at 52 degrees and above 5: about a third, 14 to 20 of 48.
     assert seen.min() >= 10
     assert seen.max() <= 24
-    assert np.nanmin(elevation) >= station.elevation_mask_rad
+    assert np.nanmin(elevation) >= station.monitors.elevation_mask_rad
 
 
 @pytest.mark.parametrize("bands", [(L1,), (L1, L5)])

@@ -22,6 +22,7 @@ from gbas_core.gnss.gpstime import from_epoch_key
 from gbas_core.io.recording import RecordedEpoch
 from gbas_ground.broadcast import BroadcastState
 from gbas_ground.params import GroundParams
+from gbas_ground.sections import SmoothingSection
 from gbas_ground.station import GroundEpoch, GroundStation, Monitored, initial_monitor_state
 from gbas_msgs_py import tables
 from gbas_msgs_py.records import ProtectionEpoch, SolutionEpoch
@@ -29,7 +30,7 @@ from gbas_vdb.transmission.receive import decode_burst
 
 INTERVAL_S: Final = 0.5
 """Interval of the benchmark's epochs: 2 Hz, the rate of the VDB."""
-SETTLE_EPOCHS: Final = round((GroundParams.settle_time_s + 30.0) / INTERVAL_S)
+SETTLE_EPOCHS: Final = round((SmoothingSection.settle_time_s + 30.0) / INTERVAL_S)
 """Epochs until every satellite is used: those of the filters, and some for the ephemeris CRCs to go round."""
 GROUND_BUDGET_S: Final = 5e-3
 """Corrections and broadcast 3 ms, monitors 2 ms."""

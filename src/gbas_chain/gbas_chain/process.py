@@ -14,13 +14,14 @@ from gbas_airborne.params import AirborneParams, airborne_section
 from gbas_bringup.resources import config_path
 from gbas_chain.chain import AirborneOutput, Chain
 from gbas_chain.results import Row, summarise, write_json, write_solution_csv
+from gbas_core.configuration import read_configuration
 from gbas_core.errors import ConfigError, GbasError
 from gbas_core.gnss.frames import geodetic_from_ecef
 from gbas_core.io.recording import RecordedEpoch, Recording
 from gbas_core.io.rinex import NavigationFile, ObservationFile
 from gbas_core.positioning.approach_keys import RECORD_KEY
 from gbas_ground.claims.broadcast_claims import statements
-from gbas_ground.params import GroundParams, ground_section
+from gbas_ground.params import SECTION, GroundParams
 from gbas_msgs_py.events import Event, EventKind
 from gbas_vdb.messages.path_point import path_points_of
 
@@ -104,7 +105,7 @@ class ProcessResult:
             **summarise(self.rows),
             "events": _event_counts(self.events),
             "notes": list(self.notes),
-            "station": {"id": self.ground.station_id, "designator": self.ground.accuracy_designator},
+            "station": {"id": self.ground.station.id, "designator": self.ground.accuracy.designator},
             "rests_on": list(statements(self.ground)),
             "simulated": self.simulated,
         }
@@ -263,7 +264,7 @@ def _ground_sections(
     path = request.station or config_path(NOMINAL_STATION)
     if request.station is None:
         notes.append(f"no station file: nominal values of {NOMINAL_STATION} are assumed")
-    sections = {name: dict(section) for name, section in ground_section(_document(path), str(path)).items()}
+    sections = read_configuration(path).section(SECTION)
     positions = request.ground_xyz_m or _header_positions(recording, notes)
     latitude, longitude, height = geodetic_from_ecef(np.array(positions[0]))
     station = sections.setdefault("station", {})

@@ -148,7 +148,7 @@ def read_flown(bag: Path, config: Path) -> Flown:
         rows=rows,
         truth_m=_truth_m(records[_TRUTH], rows).reshape(-1, 3),
         approach=station.approaches[0] if station.approaches else None,
-        station_id=station.station_id,
+        station_id=station.station.id,
         rests_on=list(statements(station)),
     )
 

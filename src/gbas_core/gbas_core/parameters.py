@@ -33,6 +33,8 @@ from pydantic import ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler, Typ
 from pydantic.json_schema import GenerateJsonSchema
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
+from gbas_core.errors import GbasError
+
 P = TypeVar("P")
 
 _ANGLES: Final = (("_rad", "_deg"), ("_radps", "_degps"))
@@ -57,7 +59,7 @@ _UNKNOWN: Final = ("unexpected_keyword_argument", "extra_forbidden")
 _MISSING: Final = ("missing", "missing_keyword_only_argument", "missing_argument")
 
 
-class ParameterError(ValueError):
+class ParameterError(GbasError, ValueError):
     """A parameter that is unknown, missing, of the wrong kind or out of bounds; the text names it and its value."""
 
 
@@ -140,6 +142,20 @@ class Parameter:
         return f"within {self.low:g} to {self.high:g}{unit}" if self.low is not None else f"{self.high:g}{unit} or less"
 
 
+@dataclasses.dataclass(frozen=True)
+class Derived(Parameter):
+    """A field that no file sets: whoever holds the set gives it, because it follows from other parameters."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        inner = super().__get_pydantic_core_schema__(source, handler)
+        return core_schema.with_info_before_validator_function(self._not_from_file, inner)
+
+    def _not_from_file(self, value: Any, info: core_schema.ValidationInfo[Any]) -> Any:
+        if info.context is not None and info.context.get("from_file", False):
+            raise PydanticCustomError(_UNKNOWN[0], "is not set by files")
+        return value
+
+
 @dataclass_transform(kw_only_default=True, frozen_default=True)
 def parameters(cls: type[P]) -> type[P]:
     """A frozen dataclass whose values are checked when it is made; see the module.
@@ -209,6 +225,37 @@ def to_mapping(params: Any) -> dict[str, Any]:
     return nested({each.key: each.value for each in declared(params)})
 
 
+def made_of(kind: type[P], values: Mapping[str, Any]) -> P:
+    """A set of parameters from dotted names of fields, in their own units; for programs that make a set.
+
+    Raises
+    ------
+    ParameterError
+        As the set does when it is made.
+    """
+    try:
+        made: P = _adapter(kind).validate_python(nested(values), by_alias=False, by_name=True)
+    except ValidationError as error:
+        raise _explained(kind, error) from None
+    return made
+
+
+def replaced(params: P, values: Mapping[str, Any]) -> P:
+    """The same with other values of some fields, by their dotted names and in their own units.
+
+    Raises
+    ------
+    ParameterError
+        As the set does when it is made.
+    """
+    parts = nested(values)
+    inner = {
+        name: replaced(getattr(params, name), value) if isinstance(value, Mapping) else value
+        for name, value in parts.items()
+    }
+    return dataclasses.replace(params, **inner)  # type: ignore[type-var]
+
+
 def nested(mapping: Mapping[str, Any]) -> dict[str, Any]:
     """Dotted keys as sections; of a key and a section of the same name the later counts.
 
@@ -269,6 +316,8 @@ def declared(params: Any, prefix: str = "") -> Iterator[Declared]:
         key = f"{prefix}{file_key(item.name)}"
         value = _default(item) if isinstance(params, type) else getattr(params, item.name)
         parameter = _parameter_of(hint)
+        if isinstance(parameter, Derived):
+            continue
         if parameter is not None:
             shown = value if value is dataclasses.MISSING else parameter.in_file_units(value)
             yield Declared(key=key, parameter=parameter, kind=hint.__origin__, value=shown)
@@ -303,7 +352,9 @@ class _InFileUnits(GenerateJsonSchema):
             parameter, place = _parameter_of(_hints(schema["cls"])[each.name]), file_key(each.name)
             entry = found.get("properties", {}).get(place, {})
             entry.pop("title", None)
-            if parameter is None:
+            if isinstance(parameter, Derived):
+                found["properties"].pop(place, None)
+            elif parameter is None:
                 entry.pop("default", None)
             elif "default" in entry:
                 entry["default"] = pydantic_core.to_jsonable_python(parameter.in_file_units(_default(each)))
@@ -370,7 +421,7 @@ def _explained(kind: type[Any], error: ValidationError, section: str = "") -> Pa
     if reason in ("too_long", "too_short") or (reason in _MISSING and isinstance(found["loc"][-1], int)):
         return ParameterError(f"{key} = {value!r} has not the right number of values")
     if reason in _UNKNOWN:
-        known = [file_key(each.name) for each in dataclasses.fields(_section_at(kind, path[:-1]))]
+        known = _keys(_section_at(kind, path[:-1]))
         return ParameterError(f"{'.'.join((*key.split('.')[:-1], path[-1]))} is unknown{_nearest(path[-1], known)}")
     if reason in _MISSING:
         parameter = _parameter_of(_hints(_section_at(kind, path[:-1])).get(_field_of(path[-1])))
@@ -388,6 +439,12 @@ def _explained(kind: type[Any], error: ValidationError, section: str = "") -> Pa
 def _nearest(name: str, known: list[str]) -> str:
     near = difflib.get_close_matches(name, known, n=1)
     return f"; did you mean '{near[0]}'?" if near else f"; known are {', '.join(sorted(known))}"
+
+
+def _keys(section: Any) -> list[str]:
+    """Keys of a section in a file."""
+    derived = {name for name, hint in _hints(section).items() if isinstance(_parameter_of(hint), Derived)}
+    return [file_key(each.name) for each in dataclasses.fields(section) if each.name not in derived]
 
 
 def _field_of(key: str) -> str:

@@ -8,14 +8,15 @@ Source: IS-GPS-200N 3.3.1.1, IS-GPS-705J 3.3.1.1, Galileo OS SIS ICD 2.1 table 2
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+Band = Literal["L1", "L2", "L5"]
 SPEED_OF_LIGHT_MPS: Final = 299_792_458.0
 
-BANDS: Final[tuple[str, ...]] = ("L1", "L2", "L5")
+BANDS: Final[tuple[Band, ...]] = ("L1", "L2", "L5")
 N_BANDS: Final = len(BANDS)
 BAND_INDEX: Final[dict[str, int]] = {band: index for index, band in enumerate(BANDS)}
 L1: Final = BAND_INDEX["L1"]

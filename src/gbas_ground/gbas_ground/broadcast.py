@@ -15,10 +15,12 @@ import numpy as np
 from gbas_core.gnss.gpstime import epoch_key
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import IS_GALILEO, RANGING_SOURCE_ID
-from gbas_ground.claims.orbit_claim import MAX_DECORRELATION
+from gbas_ground.claims.limits import MAX_DECORRELATION
 from gbas_ground.corrections.sigma import MAX_SIGMA_M
 from gbas_ground.monitors.multiple_reference import MAX_B_VALUE_M
-from gbas_ground.params import GCID_UNHEALTHY, MAX_SIGMA_VIG, MIN_SERVICE_SATELLITES, GroundParams
+from gbas_ground.param_checks import MIN_SERVICE_SATELLITES
+from gbas_ground.params import GroundParams
+from gbas_ground.sections import GCID_UNHEALTHY, MAX_SIGMA_VIG
 from gbas_msgs_py.records import MAX_REFERENCE_RECEIVERS, ChannelState, IntegrityEpoch
 from gbas_vdb.messages.types import Correction30, Correction100, FasDataSet, Type2
 from gbas_vdb.transmission.burst import FRAME_DURATION_S, Burst
@@ -79,7 +81,11 @@ def broadcastable(integrity: IntegrityEpoch, params: GroundParams) -> BoolArray:
         (integrity.prc_100_m, integrity.rrc_100_mps),
         (integrity.prc_30_m, integrity.rrc_30_mps),
     ):
-        ok = ok & (np.abs(prc) <= params.max_prc_m) & (np.abs(rrc) <= params.max_rrc_mps)
+        ok = (
+            ok
+            & (np.abs(prc) <= params.correction_limits.max_prc_m)
+            & (np.abs(rrc) <= params.correction_limits.max_rrc_mps)
+        )
     for sigma in (integrity.sigma_pr_gnd_m, integrity.sigma_pr_gnd_d_m, integrity.sigma_pr_gnd_30_m):
         ok = ok & (sigma > 0.0) & (sigma <= MAX_SIGMA_M)
     return np.asarray(ok & (b <= MAX_B_VALUE_M))
@@ -116,12 +122,12 @@ def broadcast_frame(
     station, approaches, schedule, room = _constants(params)
     usable = broadcastable(integrity, params)
     sigma_vig = integrity.sigma_vert_iono_gradient
-    enough = params.min_receivers <= integrity.n_receivers <= MAX_REFERENCE_RECEIVERS
+    enough = params.receivers.minimum <= integrity.n_receivers <= MAX_REFERENCE_RECEIVERS
     serves = bool(enough and 0.0 <= sigma_vig <= MAX_SIGMA_VIG)
     satellites = _highest(usable, integrity.elevation_rad, room) if serves else ()
     serves = len(satellites) >= MIN_SERVICE_SATELLITES
     # a station that does not serve says so, and claims the least it can of the ionosphere
-    gcid, sigma_vig = (params.gcid, sigma_vig) if serves else (GCID_UNHEALTHY, MAX_SIGMA_VIG)
+    gcid, sigma_vig = (params.station.gcid, sigma_vig) if serves else (GCID_UNHEALTHY, MAX_SIGMA_VIG)
     frame = Frame(
         gps_week=integrity.gps_week,
         tow_s=integrity.tow_s,
@@ -157,7 +163,7 @@ def _sources(
     names = ("iod", "ephemeris_crc", "prc_100_m", "rrc_100_mps", "sigma_pr_gnd_m", "p_ephemeris", "p_ephemeris_d")
     columns = [getattr(integrity, name)[chosen].tolist() for name in names]
     b_values = integrity.b_m[:, chosen].T.tolist()
-    thirty = _corrections_30(integrity, chosen) if params.gast_d else [None] * len(chosen)
+    thirty = _corrections_30(integrity, chosen) if params.gast_d.enabled else [None] * len(chosen)
     return tuple(
         SourceCorrection(
             correction=Correction100(

@@ -125,10 +125,10 @@ def form_corrections(correction_inputs: CorrectionInputs, exclusions: Exclusions
     usable = correction_inputs.ready & exclusions.usable_channels()
     in_use, common = form.common_satellites(
         usable & ~exclusions.satellites.excluded,
-        min_common=params.min_common_satellites,
-        min_receivers=params.min_receivers,
+        min_common=params.monitors.min_common_satellites,
+        min_receivers=params.receivers.minimum,
     )
-    elevation = None if params.clock_weighting == "plain" else correction_inputs.elevation_rad
+    elevation = None if params.monitors.clock_weighting == "plain" else correction_inputs.elevation_rad
     weights = form.clock_weights(common, elevation)
     adjusted = correction_inputs.correction_m - form.receiver_clock_m(correction_inputs.correction_m, weights)
     used = usable & in_use[0][:, np.newaxis] & CLOCK_GROUPS[0] | usable & in_use[1][:, np.newaxis] & CLOCK_GROUPS[1]
@@ -156,9 +156,9 @@ def _rates(
     both = used & np.isfinite(correction_inputs.previous_m).all(axis=0)
     if not np.array_equal(both, used):
         of_clock = both & (weights > 0.0).any(axis=0)
-        _, common = form.common_satellites(of_clock, min_common=params.min_common_satellites, min_receivers=1)
+        _, common = form.common_satellites(of_clock, min_common=params.monitors.min_common_satellites, min_receivers=1)
         weights = form.clock_weights(
-            common, None if params.clock_weighting == "plain" else correction_inputs.elevation_rad
+            common, None if params.monitors.clock_weighting == "plain" else correction_inputs.elevation_rad
         )
         both = both & np.isfinite(form.receiver_clock_m(correction_inputs.correction_m, weights)).all(axis=0)
     return form.rate_mps(
@@ -168,7 +168,7 @@ def _rates(
 
 def b_value_check(corrections: Corrections, params: GroundParams) -> MonitorResult:
     """B values of both smoothing constants, ``(tau, R, N)``."""
-    return check_b_values(corrections.b_m, corrections.channel_sigma_m, corrections.used, params.k_b)
+    return check_b_values(corrections.b_m, corrections.channel_sigma_m, corrections.used, params.b_value.k_b)
 
 
 def limit_checks(corrections: Corrections, params: GroundParams) -> tuple[tuple[ExclusionCause, MonitorResult], ...]:
@@ -176,8 +176,11 @@ def limit_checks(corrections: Corrections, params: GroundParams) -> tuple[tuple[
     has = corrections.count > 0
     has_rate = has & np.isfinite(corrections.rrc_mps).all(axis=0)
     return (
-        (ExclusionCause.PRC_LIMIT, check_correction(corrections.prc_m, has, params.max_prc_m)),
-        (ExclusionCause.RRC_LIMIT, check_correction(corrections.rrc_mps, has_rate, params.max_rrc_mps)),
+        (ExclusionCause.PRC_LIMIT, check_correction(corrections.prc_m, has, params.correction_limits.max_prc_m)),
+        (
+            ExclusionCause.RRC_LIMIT,
+            check_correction(corrections.rrc_mps, has_rate, params.correction_limits.max_rrc_mps),
+        ),
     )
 
 
@@ -245,13 +248,13 @@ def _worst_b_value(corrections: Corrections, exclusions: Exclusions, params: Gro
     mask[receiver, satellite] = True
     channels = exclude(exclusions.channels, mask, ExclusionCause.B_VALUE)
     faults = int((channels.cause[receiver] == ExclusionCause.B_VALUE).sum())
-    if faults >= params.receiver_fault_channels:
+    if faults >= params.monitors.receiver_fault_channels:
         latch = exclude(exclusions.receivers, np.arange(len(mask)) == receiver, ExclusionCause.RECEIVER_FAULT)
         finding = Finding(
             subject=f"rr{receiver + 1}",
             cause=ExclusionCause.RECEIVER_FAULT,
             value=float(faults),
-            threshold=float(params.receiver_fault_channels),
+            threshold=float(params.monitors.receiver_fault_channels),
         )
         return replace(exclusions, channels=channels, receivers=latch), finding
     subject = f"rr{receiver + 1}/{SAT_IDS[satellite]}"
@@ -317,22 +320,25 @@ def readmission_state(
     when it comes back. A receiver must not be seen to be wrong on its baselines; one that was excluded by them has to
     be seen to be right.
 
-    "To agree" is to be within `params.readmission_share` of the threshold: what is excluded just above it must not come
-    back just below it.
+    "To agree" is to be within `params.monitors.readmission_share` of the threshold: what is excluded just above it must
+    not come back just below it.
 
     When the exclusions leave a constellation without a clock, nothing can be compared with anything, and no exclusion
     would ever end. Then everything is judged together as if nothing were excluded, and passes together or not at all.
     """
     unused = correction_inputs.settled & ~corrections.used
     result = check_unused(
-        _residual_m(correction_inputs, corrections, params), corrections.channel_sigma_m, corrections.count, params.k_b
+        _residual_m(correction_inputs, corrections, params),
+        corrections.channel_sigma_m,
+        corrections.count,
+        params.b_value.k_b,
     )
     judged = unused & np.isfinite(result.statistic).all(axis=0) & (corrections.count > 0)
-    near = result.statistic <= params.readmission_share * result.threshold
+    near = result.statistic <= params.monitors.readmission_share * result.threshold
     agrees, disagrees = judged & near.all(axis=0), judged & result.failed.any(axis=0)
     needs_comparison = exclusions.channels.cause == ExclusionCause.B_VALUE
     channels = channel_ok & np.where(needs_comparison, agrees, ~disagrees)
-    receivers = (agrees.sum(axis=1) >= params.min_common_satellites) & ~disagrees.any(axis=1)
+    receivers = (agrees.sum(axis=1) >= params.monitors.min_common_satellites) & ~disagrees.any(axis=1)
     by_baselines = exclusions.receivers.cause == ExclusionCause.RECEIVER_BASELINES
     fits = (receivers_quiet == 1.0) | (np.isnan(receivers_quiet) & ~by_baselines)
 
@@ -383,6 +389,6 @@ def _residual_m(correction_inputs: CorrectionInputs, corrections: Corrections, p
         own = usable & group
         number = own.sum(axis=1)
         total = np.where(own, against, 0.0).sum(axis=-1)
-        clock = np.where(number >= params.min_common_satellites, total / np.maximum(number, 1), np.nan)
+        clock = np.where(number >= params.monitors.min_common_satellites, total / np.maximum(number, 1), np.nan)
         residual = np.where(group, against - clock[..., np.newaxis], residual)
     return residual

@@ -7,7 +7,6 @@ see anything, so half a second more is nothing.
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import lru_cache
 
 import numpy as np
 
@@ -18,7 +17,6 @@ from gbas_ground.exclusions import exclude
 from gbas_ground.monitors.monitor_table import MonitorSummary, summarise, worst_of
 from gbas_ground.monitors.result import MonitorResult
 from gbas_ground.monitors.sigma_monitor import (
-    SigmaMonitorParams,
     SigmaMonitorResult,
     SigmaMonitorState,
     initial_sigma_monitor,
@@ -29,14 +27,9 @@ from gbas_ground.params import GroundParams
 from gbas_msgs_py.codes import ExclusionCause
 
 
-@lru_cache(maxsize=8)
-def _settings(params: GroundParams) -> SigmaMonitorParams:
-    return params.monitors.sigma.params()
-
-
 def initial_long_term(params: GroundParams) -> SigmaMonitorState:
     """A monitor that has seen nothing."""
-    return initial_sigma_monitor(params.n_receivers, _settings(params))
+    return initial_sigma_monitor(params.n_receivers, params.sigma_monitor)
 
 
 def monitor_sigmas(
@@ -52,14 +45,14 @@ def monitor_sigmas(
     findings : tuple of Finding
     summaries : dict
     """
-    settings, used = _settings(params), corrections.used & (corrections.count >= 2)
+    settings, used = params.sigma_monitor, corrections.used & (corrections.count >= 2)
     # What is excluded, alone or with its receiver, has no B values; its old estimates count until they are forgotten.
     remembered = (state.count > 0.0) & (state.since_s + max(dt_s, 0.0) <= settings.forget_s)
     due = used | (~exclusions.usable_channels() & remembered)
     normalised = normalised_b(corrections.b_m, corrections.channel_sigma_m, used)
     state, result = sigma_monitor_step(state, normalised, due, dt_s, settings)
     summaries = {"sigma_mean": summarise(result.mean, used), "sigma_spread": summarise(result.variance, used)}
-    if not params.monitors.sigma.exclude:
+    if not params.sigma_monitor.exclude:
         return state, exclusions, (), summaries
     exclusions, findings = _excluded(exclusions, result)
     return state, exclusions, findings, summaries

@@ -19,7 +19,8 @@ from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import CLOCK_GROUPS, missing
 from gbas_core.signals import L1, L5, N_BANDS
 from gbas_ground.channels.predicted_ranges import PredictedRanges
-from gbas_ground.claims.orbit_claim import MAX_DECORRELATION, OrbitSite, orbit_bound
+from gbas_ground.claims.limits import MAX_DECORRELATION
+from gbas_ground.claims.orbit_claim import OrbitSite, orbit_bound
 from gbas_ground.monitors.carrier_acceleration import (
     CarrierAccelerationParams,
     CarrierAccelerationResult,
@@ -234,23 +235,24 @@ class _Settings(NamedTuple):
 
 @lru_cache(maxsize=8)
 def _settings(params: GroundParams) -> _Settings:
-    sections = params.monitors
     gradient = params.gradient_monitor()
-    ccd = sections.ccd.params(params.settle_time_s, params.max_gap_s)
     site = gradient_site(params.receiver_positions_m(), params.reference_point_m(), gradient)
     return _Settings(
-        ccd=ccd,
-        ccd_f=sections.ccd_f.params(ccd.filters, params.refractivity * 1e-6 * params.scale_height_m),
-        acceleration=sections.acceleration.params(params.max_gap_s, sections.carrier_noise.receiver_factor),
+        ccd=params.ccd_monitor(),
+        ccd_f=params.ccd_f_monitor(),
+        acceleration=params.carrier_acceleration_monitor(),
         gradient=gradient,
-        gradient_required=sections.gradient.required or params.gast_d,
+        gradient_required=gradient.required or params.gast_d.enabled,
         ephemeris=params.ephemeris_monitor(),
-        orbit_required=not params.external_monitor and (sections.ephemeris.required or params.gast_d),
-        power=sections.expected_power.params(params.max_gap_s),
+        orbit_required=not params.ephemeris.external_monitor
+        and (params.ephemeris_residual.required or params.gast_d.enabled),
+        power=params.expected_power_monitor(),
         site=site,
         orbit_site=params.orbit_site(),
         planes=planes_of(site.baselines, gradient.bands),
-        troposphere=Troposphere(refractivity=params.refractivity, scale_height_m=params.scale_height_m),
+        troposphere=Troposphere(
+            refractivity=params.atmosphere.refractivity, scale_height_m=params.atmosphere.scale_height_m
+        ),
     )
 
 
@@ -270,24 +272,24 @@ def run_monitors(
     state: MonitoringState, inputs: MonitorInputs, params: GroundParams
 ) -> tuple[MonitoringState, MonitoringResult]:
     """Run every monitor over one epoch."""
-    settings, sections = _settings(params), params.monitors
+    settings = _settings(params)
     residual_m = _residual_m(inputs, settings)
-    ccd, divergence = _ccd(state.ccd, inputs, settings, exclude=sections.ccd.exclude)
-    ccd_f, two_frequency = _ccd_f(state.ccd_f, inputs, settings, sections.ccd_f.exclude)
+    ccd, divergence = _ccd(state.ccd, inputs, settings, exclude=params.ccd.exclude)
+    ccd_f, two_frequency = _ccd_f(state.ccd_f, inputs, settings, params.ccd_f.exclude)
     acceleration, carrier = _acceleration(
-        state.acceleration, residual_m, inputs, settings, exclude=sections.acceleration.exclude
+        state.acceleration, residual_m, inputs, settings, exclude=params.carrier_acceleration.exclude
     )
     # A channel that jumped alone must not make a gradient of its satellite, nor what is left of a receiver's channels.
-    steady = inputs.ready & _enough(inputs.ready, params.min_common_satellites)
+    steady = inputs.ready & _enough(inputs.ready, params.monitors.min_common_satellites)
     for verdict in carrier.channels:
         steady = steady & ~verdict.result.failed
     differences, receivers = _fitting_differences(residual_m, steady, inputs, settings, params)
-    gradient = _gradient(differences, inputs, settings, exclude=sections.gradient.exclude)
+    gradient = _gradient(differences, inputs, settings, exclude=params.ionosphere_gradient.exclude)
     ephemeris, orbit, bound = _ephemeris(
-        state.ephemeris, differences, inputs, settings, exclude=sections.ephemeris.exclude
+        state.ephemeris, differences, inputs, settings, exclude=params.ephemeris_residual.exclude
     )
     power, expectation = _power(
-        state.power, inputs, settings, exclude=sections.expected_power.exclude, required=params.require_cn0
+        state.power, inputs, settings, exclude=params.expected_power.exclude, required=params.signal_power.require_cn0
     )
     parts = (_common_slip(inputs), divergence, two_frequency, carrier, gradient, orbit, expectation)
     ready = np.ones_like(inputs.due)
@@ -352,7 +354,7 @@ def _ccd_f(
         clock_used=inputs.usable,
     )
     state, epoch = two_frequency_step(state, given, inputs.dt_s, params)
-    forms = {"sound": epoch.sound, "paper": epoch.paper}
+    forms = {"full_rank": epoch.sound, "published": epoch.paper}
     due = inputs.due & (epoch.receivers > 0)
     chosen = forms.get(exclude)
     return state, _MonitorOutput(
@@ -464,9 +466,9 @@ def _shared_receiver(
 ) -> SharedReceiver:
     threshold_m = settings.site.k_ffd * differences.sigma_m
     due = inputs.due & (np.abs(differences.residual_m) > threshold_m).any(axis=(0, 1))
-    if not (due.any() and params.monitors.gradient.exclude):
+    if not (due.any() and params.ionosphere_gradient.exclude):
         count = len(inputs.code_m)
-        least = np.full(count, float(params.receiver_fault_channels))
+        least = np.full(count, float(params.monitors.receiver_fault_channels))
         nobody = MonitorResult(statistic=np.zeros(count), threshold=least, failed=np.zeros(count, dtype=bool))
         return SharedReceiver(receivers=nobody, most=False)
     return shared_receiver(
@@ -477,7 +479,7 @@ def _shared_receiver(
         inputs.due,
         inputs.predicted.elevation_rad,
         inputs.predicted.azimuth_rad,
-        params.receiver_fault_channels,
+        params.monitors.receiver_fault_channels,
     )
 
 
@@ -492,7 +494,7 @@ def _quiet_receivers(
         again[receiver] |= inputs.suspended[receiver]
         differences = _double_differences(residual_m, again, inputs, settings)
         threshold_m = settings.site.k_ffd * differences.sigma_m
-        found = seen_quiet(differences, threshold_m, baselines, int(receiver), params.min_common_satellites)
+        found = seen_quiet(differences, threshold_m, baselines, int(receiver), params.monitors.min_common_satellites)
         quiet[receiver] = np.nan if found is None else float(found)
     return quiet
 

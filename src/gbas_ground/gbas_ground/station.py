@@ -220,7 +220,7 @@ def initial_state(params: GroundParams) -> StationState:
 
 @lru_cache(maxsize=8)
 def _constants(params: GroundParams) -> tuple[Site, BoolArray]:
-    return site_of(params), satellites_of(params.systems)
+    return site_of(params), satellites_of(params.station.systems)
 
 
 class GroundStation:
@@ -461,7 +461,7 @@ def _track_channels(
     predicted = predict_ranges(known.current, epoch.gps_week, epoch.tow_s, raw.code_m[:, L1], site)
     tracked = np.isfinite(raw.code_m[:, L1] + raw.carrier_m[:, L1])
     checks = _channel_checks(raw, predicted, tracked, params)
-    excluding = checks if params.monitors.power.exclude else checks[:1]
+    excluding = checks if params.signal_power.exclude else checks[:1]
     exclusions = _exclude_channels(exclusions, excluding, events)
     exclusions = _exclude_receivers(
         exclusions, _far_receivers(checks[0][1], params), ExclusionCause.RECEIVER_FAULT, events
@@ -498,8 +498,8 @@ def _monitor_inputs(
     site, _ = _constants(params)
     raw, tracks, predicted = observed.raw, observed.tracks, observed.predicted
     usable = observed.channel_ok & exclusions.usable_channels()
-    high = predicted.elevation_rad >= params.elevation_mask_rad
-    due = ((usable & observed.settled).sum(axis=0) >= params.min_receivers) & np.isfinite(known.crc)
+    high = predicted.elevation_rad >= params.monitors.elevation_mask_rad
+    due = ((usable & observed.settled).sum(axis=0) >= params.receivers.minimum) & np.isfinite(known.crc)
     return MonitorInputs(
         code_m=raw.code_m,
         carrier_m=tracks.carrier_m,
@@ -532,7 +532,7 @@ def _correction_inputs(
 ) -> CorrectionInputs:
     """What the corrections are formed from."""
     site, _ = _constants(params)
-    previous = state.previous if dt_s <= params.max_gap_s else None
+    previous = state.previous if dt_s <= params.smoothing.max_gap_s else None
     return CorrectionInputs(
         correction_m=observed.correction_m,
         previous_m=_previous_corrections(
@@ -626,17 +626,17 @@ def _contribution_events(
 
 def _released(exclusions: Exclusions, params: GroundParams, events: EventLog) -> Exclusions:
     """End what has been clear for the re-admission time."""
-    times = params.readmission_time_s, params.readmission_longest_s
+    times = params.monitors.readmission_time_s, params.monitors.readmission_longest_s
     channels, channels_ended = release(exclusions.channels, *times)
     receivers, receivers_ended = release(exclusions.receivers, *times)
     satellites, _ = release(exclusions.satellites, *times)  # told when they are usable again
     for row in np.flatnonzero(receivers_ended):
         cause = ExclusionCause(int(exclusions.receivers.cause[row]))
-        waited_s = max(params.readmission_time_s, float(exclusions.receivers.wait_s[row]))
+        waited_s = max(params.monitors.readmission_time_s, float(exclusions.receivers.wait_s[row]))
         events.add(EventKind.READMISSION, f"rr{row + 1}", cause.word, waited_s)
     for row, satellite in np.argwhere(channels_ended) if channels_ended.any() else ():
         cause = ExclusionCause(int(exclusions.channels.cause[row, satellite]))
-        waited_s = max(params.readmission_time_s, float(exclusions.channels.wait_s[row, satellite]))
+        waited_s = max(params.monitors.readmission_time_s, float(exclusions.channels.wait_s[row, satellite]))
         events.add(EventKind.READMISSION, f"rr{row + 1}/{SAT_IDS[satellite]}", cause.word, waited_s)
     return Exclusions(channels=channels, receivers=receivers, satellites=satellites)
 
@@ -645,8 +645,10 @@ def _channel_checks(raw: RawEpoch, predicted: PredictedRanges, tracked: BoolArra
     """Monitors of single channels, each ``(R, N)``; the first also keeps measurements out of the filters."""
     raw_correction = range_correction_m(predicted.range_m, raw.code_m[:, L1], predicted.clock_s)
     comparable = tracked & np.isfinite(predicted.clock_s)
-    residual = check_expected_range(raw_correction, comparable, params.max_range_residual_m)
-    power = check_signal_power(raw.cn0_dbhz[:, L1], tracked, params.min_cn0_dbhz, required=params.require_cn0)
+    residual = check_expected_range(raw_correction, comparable, params.expected_range.max_residual_m)
+    power = check_signal_power(
+        raw.cn0_dbhz[:, L1], tracked, params.signal_power.min_cn0_dbhz, required=params.signal_power.require_cn0
+    )
     return ((ExclusionCause.RANGE_RESIDUAL, residual), (ExclusionCause.SIGNAL_POWER, power))
 
 
@@ -669,7 +671,7 @@ def _far_receivers(residual: MonitorResult, params: GroundParams) -> MonitorResu
     too.
     """
     failures = residual.failed.sum(axis=1)
-    least = params.receiver_fault_channels
+    least = params.monitors.receiver_fault_channels
     return MonitorResult(
         statistic=failures.astype(np.float64), threshold=np.array(float(least)), failed=failures >= least
     )
@@ -739,8 +741,8 @@ def _previous_corrections(
 
 def _settled(tracks: Tracks, correction_m: FloatArray, predicted: PredictedRanges, params: GroundParams) -> BoolArray:
     """Channels whose filters have run long enough, of satellites above the mask, ``(R, N)``."""
-    high = predicted.elevation_rad >= params.elevation_mask_rad
-    return np.isfinite(correction_m).all(axis=0) & (tracks.age_s >= params.settle_time_s) & high
+    high = predicted.elevation_rad >= params.monitors.elevation_mask_rad
+    return np.isfinite(correction_m).all(axis=0) & (tracks.age_s >= params.smoothing.settle_time_s) & high
 
 
 def _advanced(
@@ -756,14 +758,14 @@ def _advanced(
     latches = (exclusions.channels, exclusions.receivers, exclusions.satellites)
     if not any(latch.remembers for latch in latches):
         return exclusions
-    satellite_ok = monitor_output.passed(params.readmission_share)
+    satellite_ok = monitor_output.passed(params.monitors.readmission_share)
     passed = readmission_state(
         correction_inputs, corrections, exclusions, channel_ok, monitor_output.receivers_quiet, satellite_ok, params
     )
     return Exclusions(
-        channels=advance(exclusions.channels, passed.channels, dt_s, params.max_gap_s),
-        receivers=advance(exclusions.receivers, passed.receivers, dt_s, params.max_gap_s),
-        satellites=advance(exclusions.satellites, passed.satellites, dt_s, params.max_gap_s),
+        channels=advance(exclusions.channels, passed.channels, dt_s, params.smoothing.max_gap_s),
+        receivers=advance(exclusions.receivers, passed.receivers, dt_s, params.smoothing.max_gap_s),
+        satellites=advance(exclusions.satellites, passed.satellites, dt_s, params.smoothing.max_gap_s),
     )
 
 

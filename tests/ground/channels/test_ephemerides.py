@@ -14,7 +14,7 @@ from gbas_vdb.messages.ephemeris_crc import ephemeris_crcs
 from ground_runs import params
 from synthetic_ranges import TOW_S, WEEK, truth
 
-STATION = params(2, ephemeris_settle_s=0.0)
+STATION = params(2, ephemeris__settle_s=0.0)
 WORLD = truth(2).ephemeris
 # Steps that a navigation message can carry and that move no satellite by more than the 250 m a change may move it.
 SMALL = {

@@ -12,7 +12,7 @@ from monitor_scenes import braunschweig_station
 
 FULL = {
     "gast_d": {"enabled": True, "y_eig_m": 1.3, "m_eig": 0.3e-3},
-    "gradient": {"min_coverage": 1.0, "runway_bearing_deg": [84.73]},
+    "ionosphere_gradient": {"min_coverage": 1.0, "runway_bearing_deg": [84.73]},
     "carrier_noise": {"floor_m": [0.0004] * 3, "low_m": [0.003] * 3},
 }
 
@@ -63,10 +63,10 @@ def test_type_d_says_what_bounds_gradients() -> None:
         (4, {"receivers": {"minimum": 1}}, 7),
         (4, {"ephemeris_residual": {"exclude": False}}, 7),
         (4, {"ccd": {"exclude": False}}, 7),
-        (4, {"acceleration": {"exclude": False}}, 7),
-        (4, {"gradient": {"exclude": False}}, 7),
+        (4, {"carrier_acceleration": {"exclude": False}}, 7),
+        (4, {"ionosphere_gradient": {"exclude": False}}, 7),
         (4, {"sigma_monitor": {"exclude": False}}, 7),
-        (4, {"monitors": {"require_cn0": False}}, 7),
+        (4, {"signal_power": {"require_cn0": False}}, 7),
     ],
 )
 def test_designator_follows_from_the_monitors(count: int, sections: dict, gcid: int) -> None:

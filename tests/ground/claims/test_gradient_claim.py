@@ -63,20 +63,20 @@ def test_coverage_is_that_of_the_intervals(elevation_deg: float) -> None:
     ("count", "sections", "expected"),
     [
         (2, {"gast_d": TYPE_D}, "gast_d.y_eig_m = 1.3 is below what the site's gradient monitor supports (nothing: "),
-        (4, {"gast_d": TYPE_D}, "with gradient.min_coverage = 0, gradients up to 2000 mm/km may go undetected"),
-        (2, {"gast_d": TYPE_D, "gradient": FULL}, "the baselines detect at most 5"),
-        (4, {"gast_d": TYPE_D, "gradient": {**FULL, "exclude": False}, **QUIET}, "gradient.exclude is false"),
+        (4, {"gast_d": TYPE_D}, "with ionosphere_gradient.min_coverage = 0, gradients up to 2000 mm/km may go undetected"),
+        (2, {"gast_d": TYPE_D, "ionosphere_gradient": FULL}, "the baselines detect at most 5"),
+        (4, {"gast_d": TYPE_D, "ionosphere_gradient": {**FULL, "exclude": False}, **QUIET}, "ionosphere_gradient.exclude is false"),
         (
             4,
-            {"gast_d": {**TYPE_D, "y_eig_m": 1.2}, "gradient": FULL, **QUIET},
+            {"gast_d": {**TYPE_D, "y_eig_m": 1.2}, "ionosphere_gradient": FULL, **QUIET},
             "y_eig_m = 1.2 is below what the site's",
         ),
-        (4, {"gast_d": {**TYPE_D, "y_eig_m": 1.2}, "gradient": FULL, **QUIET}, "(1.3 m: all of 300 to 2000 mm/km"),
-        (4, {"gast_d": {**TYPE_D, "m_eig": 0.2e-3}, "gradient": FULL, **QUIET}, "gast_d.m_eig = 0.0002 is below"),
+        (4, {"gast_d": {**TYPE_D, "y_eig_m": 1.2}, "ionosphere_gradient": FULL, **QUIET}, "(1.3 m: all of 300 to 2000 mm/km"),
+        (4, {"gast_d": {**TYPE_D, "m_eig": 0.2e-3}, "ionosphere_gradient": FULL, **QUIET}, "gast_d.m_eig = 0.0002 is below"),
         (4, {"gast_d": {**TYPE_D, "y_eig_m": 3.0}}, "gast_d.m_eig = 0.0003 is below"),
         (
             4,
-            {"gast_d": TYPE_D, "gradient": {**FULL, "range": [500e-6, 2000e-6]}, **QUIET},
+            {"gast_d": TYPE_D, "ionosphere_gradient": {**FULL, "gradient_range": [500e-6, 2000e-6]}, **QUIET},
             "(2.1 m: all of 500 to 2000 mm/km",
         ),
         (4, {"station": {"gcid": 2}}, "station.gcid = 2 claims service type D"),
@@ -93,24 +93,24 @@ def test_smaller_bounds_are_refused_by_name(count: int, sections: dict, expected
     ("count", "sections"),
     [
         (2, {"gast_d": {"enabled": True}}),  # the largest values claim nothing
-        (4, {"gast_d": TYPE_D, "gradient": FULL, **QUIET}),
+        (4, {"gast_d": TYPE_D, "ionosphere_gradient": FULL, **QUIET}),
         (
             4,
             {
                 "gast_d": {**TYPE_D, "y_eig_m": 2.1, "m_eig": 0.5e-3},
-                "gradient": {**FULL, "range": [5e-4, 2e-3]},
+                "ionosphere_gradient": {**FULL, "gradient_range": [5e-4, 2e-3]},
                 **QUIET,
             },
         ),
-        (2, {"gast_d": {**TYPE_D, "y_eig_m": 2.6, "m_eig": 0.6e-3}, "gradient": {"range": [3e-4, 6e-4]}}),
+        (2, {"gast_d": {**TYPE_D, "y_eig_m": 2.6, "m_eig": 0.6e-3}, "ionosphere_gradient": {"gradient_range": [3e-4, 6e-4]}}),
     ],
     ids=["largest", "full coverage", "range begins at 500", "range ends at 600"],
 )
 def test_supported_bounds_are_accepted_as_given(count: int, sections: dict) -> None:
     station = braunschweig_station(count, **sections)
     given = sections["gast_d"]
-    assert station.y_eig_m == given.get("y_eig_m", MAX_Y_EIG_M)
-    assert station.m_eig == given.get("m_eig", MAX_M_EIG)
+    assert station.gast_d.y_eig_m == given.get("y_eig_m", MAX_Y_EIG_M)
+    assert station.gast_d.m_eig == given.get("m_eig", MAX_M_EIG)
 
 
 def test_claims_without_type_d_are_not_looked_at() -> None:

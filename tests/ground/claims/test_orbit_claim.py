@@ -122,7 +122,7 @@ def test_p_is_in_steps_of_the_message_and_never_smaller() -> None:
 
 
 def ran(receivers: int, seconds: int = 8, **changes: object):
-    station = params(receivers, systems="G", slots="ABC", settle_time_s=2.0, **changes)
+    station = params(receivers, station__systems="G", vdb__slots="ABC", smoothing__settle_time_s=2.0, **changes)
     return station, run(truth(receivers), station, half_seconds(2 * seconds))
 
 
@@ -143,7 +143,7 @@ def test_running_station_broadcasts_what_its_monitor_supports() -> None:
 
 
 def test_receivers_that_drop_out_take_the_claim_with_them() -> None:
-    station = params(4, systems="G", settle_time_s=2.0)
+    station = params(4, station__systems="G", smoothing__settle_time_s=2.0)
 
     def three_then_two(second: float, observed):
         gone = 0 if second < 4.0 else 1 if second < 6.0 else 2

@@ -23,7 +23,7 @@ def faulty_run():
         result[1, G02] = 8.0 if 20.0 <= second < 30.0 else 0.0
         return result
 
-    station = params(3, tau_s=(2.0, 2.0), accuracy_designator="C")
+    station = params(3, smoothing__tau_s=(2.0, 2.0), accuracy__designator="C")
     return run(truth(3), station, half_seconds(140), code_error_m=error, carrier_error_m=lambda _: 0.0)
 
 

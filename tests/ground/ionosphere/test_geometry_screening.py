@@ -42,7 +42,7 @@ def station(systems="GE", d_max_m=50_000.0, **ionosphere):
 def sky_of(params, names=tuple(SKY), receivers=4.0):
     elevation, azimuth, count = (np.full(N_SATS, np.nan) for _ in range(3))
     for name in names:
-        if name[0] in params.systems:
+        if name[0] in params.station.systems:
             elevation[SAT_INDEX[name]], azimuth[SAT_INDEX[name]] = np.deg2rad(SKY[name])
             count[SAT_INDEX[name]] = receivers
     sent = np.isfinite(elevation)
@@ -54,7 +54,7 @@ def prepared(params, names=tuple(SKY)):
     sent, sky = sky_of(params, names)
     places = np.flatnonzero(sent)
     groups = np.array([[name == "G" for name in ("G" if i < 32 else "E" for i in places)]])
-    groups = np.concatenate([groups, ~groups]) if "E" in params.systems else groups
+    groups = np.concatenate([groups, ~groups]) if "E" in params.station.systems else groups
     return cases_of(places, sky, params), groups
 
 

@@ -404,14 +404,14 @@ def test_noise_ratio_of_a_station_file():
     sections = {
         "station": {"id": "EDVE", "latitude_deg": 52.32, "longitude_deg": 10.55, "height_m": 130.0},
         "receivers": {f"rr{number + 1}_ecef_m": place.tolist() for number, place in enumerate(BRAUNSCHWEIG_M)},
-        "gradient": {"runway_bearing_deg": [84.73]},
+        "ionosphere_gradient": {"runway_bearing_deg": [84.73]},
     }
     high = np.full(N_SATS, np.radians(60.0))
     coverage = {}
     for factors in ((1.0,), (2.0, 0.5, 1.0, 4.0), (4.0,)):
         station = GroundParams.from_mapping(sections | {"carrier_noise": {"receiver_factor": list(factors)}})
-        noise = station.monitors.carrier_noise.params()
-        params = station.monitors.gradient.params((), noise)
+        noise = station.carrier_noise.params()
+        params = station.ionosphere_gradient.params((), noise)
         site = gradient_site(station.receiver_positions_m(), station.reference_point_m(), params)
         coverage[factors] = float(coverage_at(high[:1], high[:1], site, params)[0])
         made = double_differences(
@@ -422,7 +422,7 @@ def test_noise_ratio_of_a_station_file():
             sigma_i = each[i] * float(noise.sigma_m(high, (L1,))[0, 0])
             expected = double_difference_sigma_m(sigma_i, each[j] / each[i])
             assert made.sigma_m[row, 0, 20] == pytest.approx(float(expected), rel=1e-12)
-        acceleration = station.monitors.acceleration.params(1.0, station.monitors.carrier_noise.receiver_factor)
+        acceleration = station.carrier_acceleration.params(1.0, station.carrier_noise.receiver_factor)
         np.testing.assert_array_equal(acceleration.noise.factors(4), each)
     assert coverage[(1.0,)] > coverage[(2.0, 0.5, 1.0, 4.0)] > coverage[(4.0,)]
 

@@ -1,100 +1,100 @@
-"""A final approach from the keys of a configuration file."""
+"""A final approach as it stands in a configuration file."""
 
 from __future__ import annotations
 
-import math
+import dataclasses
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
-from gbas_core.positioning.approach import FinalApproach
+from gbas_core.parameters import Parameter, ParameterError, file_key, from_mapping, parameters
+from gbas_core.positioning.approach import POINT_IN_SPACE_COURSE_WIDTH_M, FinalApproach
 from gbas_core.positioning.arinc424 import approach_values
 
-_ANGLES: Final = {
-    "ltp_latitude_deg": "ltp_lat_rad",
-    "ltp_longitude_deg": "ltp_lon_rad",
-    "delta_fpap_latitude_deg": "delta_fpap_lat_rad",
-    "delta_fpap_longitude_deg": "delta_fpap_lon_rad",
-    "course_deg": "course_rad",
-    "gpa_deg": "gpa_rad",
-}
-_LENGTHS: Final = (
-    "ltp_height_m", "fpap_distance_m", "tch_m", "course_width_m", "delta_length_offset_m", "fasval_m", "faslal_m",
-)  # fmt: skip
-_TEXTS: Final = ("airport_id", "runway", "route", "rpi")
-_NUMBERS: Final = ("apd", "rpds")
-_BY_COURSE: Final = {"course_deg", "fpap_distance_m"}
-_BY_FPAP: Final = {"delta_fpap_latitude_deg", "delta_fpap_longitude_deg"}
 RECORD_KEY: Final = "arinc424"
 """Key of a path point record, in place of the fields of an approach."""
+_BY_COURSE: Final = ("course_rad", "fpap_distance_m")
+_BY_FPAP: Final = ("delta_fpap_latitude_rad", "delta_fpap_longitude_rad")
 _BESIDE_RECORD: Final = ("apd", "rpds", "rpi", "fasval_m", "faslal_m")
-_REQUIRED: Final = ("ltp_latitude_deg", "ltp_longitude_deg", "ltp_height_m", "tch_m", "gpa_deg", "fasval_m", "faslal_m")
+_REQUIRED: Final = ("ltp_latitude_rad", "ltp_longitude_rad", "ltp_height_m", "tch_m", "gpa_rad", "fasval_m", "faslal_m")
+_OTHER_NAMES: Final = {
+    "ltp_latitude_rad": "ltp_lat_rad",
+    "ltp_longitude_rad": "ltp_lon_rad",
+    "delta_fpap_latitude_rad": "delta_fpap_lat_rad",
+    "delta_fpap_longitude_rad": "delta_fpap_lon_rad",
+}
+
+
+@parameters
+class ApproachSection:
+    """A final approach segment; the course by its bearing and length, by the FPAP, or all by a path point record."""
+
+    arinc424: Annotated[str | None, Parameter("path point record of ARINC 424, in place of the fields")] = None
+    ltp_latitude_rad: Annotated[float | None, Parameter("landing threshold point", "deg", -90.0, 90.0)] = None
+    ltp_longitude_rad: Annotated[float | None, Parameter("landing threshold point", "deg", -180.0, 180.0)] = None
+    ltp_height_m: Annotated[
+        float | None, Parameter("landing threshold point above the ellipsoid", "m", -512.0, 6041.5)
+    ] = None
+    course_rad: Annotated[float | None, Parameter("true course at the threshold", "deg", -360.0, 360.0)] = None
+    fpap_distance_m: Annotated[float | None, Parameter("from the threshold to the FPAP", "m", 1.0, 2e4)] = None
+    delta_fpap_latitude_rad: Annotated[float | None, Parameter("of the FPAP from the LTP", "deg", -90.0, 90.0)] = None
+    delta_fpap_longitude_rad: Annotated[float | None, Parameter("of the FPAP from the LTP", "deg", -180.0, 180.0)] = (
+        None
+    )
+    tch_m: Annotated[float | None, Parameter("threshold crossing height", "m", 0.0, 1638.35)] = None
+    gpa_rad: Annotated[float | None, Parameter("glide path angle", "deg", 0.01, 89.99)] = None
+    course_width_m: Annotated[
+        float | None, Parameter("half width of the course at the threshold", "m", POINT_IN_SPACE_COURSE_WIDTH_M, 143.75)
+    ] = None
+    delta_length_offset_m: Annotated[
+        float | None, Parameter("from the stop end of the runway to the FPAP; left out: not given", "m", 0.0, 2032.0)
+    ] = None
+    fasval_m: Annotated[float | None, Parameter("vertical alert limit at the decision point", "m", 0.0, 50.8)] = None
+    faslal_m: Annotated[float | None, Parameter("lateral alert limit at the decision point", "m", 0.0, 50.8)] = None
+    apd: Annotated[int | None, Parameter("approach performance designator: 1 is type C", "-", 0, 7)] = None
+    rpds: Annotated[int | None, Parameter("reference path data selector", "-", 0, 48)] = None
+    airport_id: Annotated[str | None, Parameter("airport")] = None
+    runway: Annotated[str | None, Parameter("runway, such as '26' or '15R'")] = None
+    route: Annotated[str | None, Parameter("route letter")] = None
+    rpi: Annotated[str | None, Parameter("reference path identifier, 4 characters")] = None
+
+    def __post_init__(self) -> None:
+        self.approach()  # what is none is refused here
+
+    def approach(self) -> FinalApproach:
+        """The approach.
+
+        Raises
+        ------
+        ValueError
+            Naming a key that is missing or given beside another, what is out of bounds, or columns of a record.
+        """
+        given = {item.name: getattr(self, item.name) for item in dataclasses.fields(self)}
+        given = {name: value for name, value in given.items() if value is not None}
+        record = given.pop(RECORD_KEY, None)
+        if record is not None:
+            if fixed := sorted(set(given) - set(_BESIDE_RECORD)):
+                may = ", ".join(_BESIDE_RECORD)
+                raise ParameterError(f"{file_key(fixed[0])} is given beside {RECORD_KEY}, where only {may} may be")
+            values: dict[str, Any] = approach_values(record)
+            return FinalApproach(**(values | given))
+        by_course, by_fpap = ([name in given for name in names] for names in (_BY_COURSE, _BY_FPAP))
+        if not (all(by_course) and not any(by_fpap)) and not (all(by_fpap) and not any(by_course)):
+            ways = [" and ".join(sorted(map(file_key, names))) for names in (_BY_COURSE, _BY_FPAP)]
+            raise ParameterError(f"the course needs {ways[0]}, or {ways[1]}")
+        if missing := [name for name in _REQUIRED if name not in given]:
+            raise ParameterError(f"{file_key(missing[0])} is missing")
+        arguments: dict[str, Any] = {_OTHER_NAMES.get(name, name): value for name, value in given.items()}
+        return FinalApproach.from_course(**arguments) if all(by_course) else FinalApproach(**arguments)
 
 
 def approach_from_mapping(mapping: Mapping[str, Any]) -> FinalApproach:
-    """Final approach from the keys of a configuration file.
+    """Final approach from the keys of a configuration file (:class:`ApproachSection`).
 
-    Parameters
-    ----------
-    mapping : mapping
-        ``ltp_latitude_deg``, ``ltp_longitude_deg``, ``ltp_height_m``; the course as ``course_deg`` (true) with
-        ``fpap_distance_m``, or as ``delta_fpap_latitude_deg`` with ``delta_fpap_longitude_deg``; ``tch_m``,
-        ``gpa_deg``, ``fasval_m``, ``faslal_m``; and, when wanted, ``course_width_m``, ``delta_length_offset_m``,
-        ``apd``, ``airport_id``, ``runway`` (``"26"``, ``"15R"``), ``route``, ``rpi``, ``rpds``.
-
-        Or ``arinc424``: a path point record, of which ``apd``, ``rpds``, ``rpi``, ``fasval_m`` and ``faslal_m`` may be
-        given otherwise (a record of an SBAS approach has no data selector, and no designator of type C). Its CRC is
-        checked by who broadcasts it (:mod:`gbas_vdb.messages.path_point`).
+    The CRC of a path point record is checked by who broadcasts it (:mod:`gbas_vdb.messages.path_point`).
 
     Raises
     ------
-    ValueError
+    ParameterError
         Naming a key that is unknown, missing or out of bounds, or columns of a record.
     """
-    if RECORD_KEY in mapping:
-        return _of_record(mapping)
-    known = {*_ANGLES, *_LENGTHS, *_TEXTS, *_NUMBERS, RECORD_KEY}
-    if unknown := sorted(set(mapping) - known):
-        raise ValueError(f"unknown key {unknown[0]!r}; known are {', '.join(sorted(known))}")
-    ways = (_BY_COURSE & set(mapping), _BY_FPAP & set(mapping))
-    if ways not in ((_BY_COURSE, set()), (set(), _BY_FPAP)):
-        raise ValueError(f"the course needs {' and '.join(sorted(_BY_COURSE))}, or {' and '.join(sorted(_BY_FPAP))}")
-    if missing := [key for key in _REQUIRED if key not in mapping]:
-        raise ValueError(f"{missing[0]} is missing")
-    arguments: dict[str, Any] = {
-        name: math.radians(_number(mapping, key)) for key, name in _ANGLES.items() if key in mapping
-    }
-    arguments |= {key: _number(mapping, key) for key in _LENGTHS if key in mapping}
-    arguments |= {key: _text(mapping, key) for key in _TEXTS if key in mapping}
-    arguments |= {key: _whole(mapping, key) for key in _NUMBERS if key in mapping}
-    return FinalApproach.from_course(**arguments) if ways[0] else FinalApproach(**arguments)
-
-
-def _of_record(mapping: Mapping[str, Any]) -> FinalApproach:
-    if fixed := sorted(set(mapping) - {RECORD_KEY} - set(_BESIDE_RECORD)):
-        raise ValueError(f"{fixed[0]} is given beside {RECORD_KEY}, where only {', '.join(_BESIDE_RECORD)} may be")
-    values: dict[str, Any] = approach_values(_text(mapping, RECORD_KEY))
-    for key in set(mapping) - {RECORD_KEY}:
-        read = _text if key in _TEXTS else _whole if key in _NUMBERS else _number
-        values[key] = read(mapping, key)
-    return FinalApproach(**values)
-
-
-def _number(mapping: Mapping[str, Any], key: str) -> float:
-    value = mapping[key]
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise ValueError(f"{key} = {value!r} is not a number")
-    return float(value)
-
-
-def _whole(mapping: Mapping[str, Any], key: str) -> int:
-    value = mapping[key]
-    if isinstance(value, bool) or not isinstance(value, int):
-        raise ValueError(f"{key} = {value!r} is not a whole number")
-    return value
-
-
-def _text(mapping: Mapping[str, Any], key: str) -> str:
-    value = mapping[key]
-    if not isinstance(value, str):
-        raise ValueError(f"{key} = {value!r} is not a text (quote it)")
-    return value
+    return from_mapping(ApproachSection, mapping).approach()

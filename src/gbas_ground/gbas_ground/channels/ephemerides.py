@@ -49,7 +49,7 @@ def receive(
 ) -> tuple[EphemerisState, tuple[Event, ...]]:
     """Store newly received ephemerides, but for those that do not continue the ones before."""
     old = state.store.usable(gps_week, tow_s, 0.0)
-    check = check_ephemeris_change(new, old, gps_week, tow_s, params.ephemeris_max_change_m)
+    check = check_ephemeris_change(new, old, gps_week, tow_s, params.ephemeris.max_change_m)
     events = tuple(
         Event(
             gps_week=gps_week, tow_s=tow_s, kind=EventKind.INPUT, subject=SAT_IDS[satellite],
@@ -74,7 +74,7 @@ def choose(
     events : tuple of Event
         The changes from one ephemeris to the next, with the new issue of data as value.
     """
-    current = state.store.usable(gps_week, tow_s, params.ephemeris_settle_s)
+    current = state.store.usable(gps_week, tow_s, params.ephemeris.settle_s)
     before, now = state.identity, _identity(current)
     present, was_present = np.isfinite(current.message), np.isfinite(state.current.message)
     # A record that differs anywhere is another one, under the same issue of data too: the CRC must tell the aircraft.

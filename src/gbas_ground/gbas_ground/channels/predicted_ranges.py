@@ -38,7 +38,7 @@ class Site:
 def site_of(params: GroundParams) -> Site:
     """Positions of a station."""
     positions = np.concatenate([params.receiver_positions_m(), params.reference_point_m()[np.newaxis]])
-    return Site(positions_m=positions, enu=rot_enu_ecef(params.latitude_rad, params.longitude_rad))
+    return Site(positions_m=positions, enu=rot_enu_ecef(params.station.latitude_rad, params.station.longitude_rad))
 
 
 class PredictedRanges(NamedTuple):

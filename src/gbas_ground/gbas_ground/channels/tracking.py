@@ -95,7 +95,9 @@ class Tracks:
 
 def smoothing_params(params: GroundParams) -> SmoothingParams:
     """Settings of the smoothing filters."""
-    return SmoothingParams(tau_s=tuple(tau or _NO_SMOOTHING_TAU_S for tau in params.tau_s), max_gap_s=params.max_gap_s)
+    return SmoothingParams(
+        tau_s=tuple(tau or _NO_SMOOTHING_TAU_S for tau in params.smoothing.tau_s), max_gap_s=params.smoothing.max_gap_s
+    )
 
 
 def initial_tracking(params: GroundParams) -> tuple[TrackGroup, ...]:
@@ -122,7 +124,7 @@ def track(
     params : GroundParams
     """
     n_receivers = len(raw.present)
-    smoothed_m = missing(len(params.tau_s), n_receivers)
+    smoothed_m = missing(len(params.smoothing.tau_s), n_receivers)
     age_s = missing(n_receivers)
     carrier_m, slipped = missing(n_receivers, N_BANDS), np.zeros(raw.carrier_m.shape, dtype=bool)
     stepped, waiting = [], []
@@ -154,7 +156,7 @@ def _step(
         raw.doppler_hz[rows],
         raw.lli[rows],
         dt_s,
-        SlipParams(max_gap_s=params.max_gap_s, follow_code_steps=True),
+        SlipParams(max_gap_s=params.smoothing.max_gap_s, follow_code_steps=True),
         range_m=range_m[rows],
     )
     smoothing, _ = smooth_step(

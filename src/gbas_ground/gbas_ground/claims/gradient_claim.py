@@ -31,14 +31,11 @@ from typing import Final
 import numpy as np
 
 from gbas_core.record import FloatArray
+from gbas_ground.claims.limits import MAX_M_EIG, MAX_Y_EIG_M
 from gbas_ground.monitors.double_difference import NO_REFERENCE, DoubleDifferences
 from gbas_ground.monitors.ephemeris_residual import REFERENCE_ELEVATION_RAD
 from gbas_ground.monitors.ionosphere_gradient import GradientSite, IonosphereGradientParams, check_ionosphere_gradient
 
-MAX_Y_EIG_M: Final = 3.0
-"""Largest ionospheric error at the station that additional data block 3 carries [m]."""
-MAX_M_EIG: Final = 0.7e-3
-"""Largest growth of it with distance [m/m]."""
 APPROACH_SPEED_MPS: Final = 70.0
 """Of the aircraft behind the 2.75 m of E_IG. Known."""
 _STEP_Y_M: Final = 0.1

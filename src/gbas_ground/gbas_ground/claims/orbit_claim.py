@@ -36,12 +36,11 @@ from typing import Final
 import numpy as np
 
 from gbas_core.record import BoolArray, FloatArray
+from gbas_ground.claims.limits import MAX_DECORRELATION
 from gbas_ground.monitors.carrier_noise import CarrierNoise
 from gbas_ground.monitors.double_difference import Baselines, DoubleDifferences
 from gbas_ground.monitors.ephemeris_residual import EphemerisResidualParams, assumed_sigma_m, site_decorrelation
 
-MAX_DECORRELATION: Final = 1.275e-3
-"""Largest ephemeris decorrelation parameter that a type 1 or type 11 message carries [m/m]."""
 DECORRELATION_STEP: Final = 5.0e-6
 """Step of it in the messages [m/m]."""
 

@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from gbas_core.models.error_models import GroundAccuracy, sigma_pr_gnd
+from gbas_core.models.error_models import sigma_pr_gnd
 from gbas_core.record import FloatArray
 from gbas_ground.params import GroundParams
 
@@ -42,12 +42,13 @@ def broadcast_sigmas(params: GroundParams, elevation_rad: FloatArray, count: Flo
     (known). The factor of the 30 s corrections, sqrt(100/30), is that of white noise through the two filters:
     uncertain, ours.
     """
-    if params.sigma_elevation_rad:
-        single = np.interp(elevation_rad, params.sigma_elevation_rad, params.sigma_table_m)
-        low = elevation_rad < params.elevation_mask_rad
+    if params.accuracy.sigma_elevation_rad:
+        single = np.interp(elevation_rad, params.accuracy.sigma_elevation_rad, params.accuracy.sigma_m)
+        low = elevation_rad < params.monitors.elevation_mask_rad
         base = np.where((count > 0) & ~low, single / np.sqrt(np.maximum(count, 1)), np.nan)
     else:
-        designator: GroundAccuracy = params.accuracy_designator  # type: ignore[assignment]  # checked by the parameters
-        base = sigma_pr_gnd(designator, elevation_rad, count, mask_rad=params.elevation_mask_rad)
-    gnd_d = params.sigma_inflation * base
-    return Sigmas(params.sigma_inflation_iono * gnd_d, gnd_d, params.sigma_30_factor * gnd_d)
+        base = sigma_pr_gnd(
+            params.accuracy.designator, elevation_rad, count, mask_rad=params.monitors.elevation_mask_rad
+        )
+    gnd_d = params.accuracy.inflation * base
+    return Sigmas(params.accuracy.inflation_iono * gnd_d, gnd_d, params.accuracy.factor_30s * gnd_d)

@@ -45,14 +45,16 @@ def satellite_status(
         Channels with code and carrier.
     """
     seen = tracked.any(axis=0)
-    visible = correction_inputs.elevation_rad >= params.elevation_mask_rad
+    visible = correction_inputs.elevation_rad >= params.monitors.elevation_mask_rad
     usable = exclusions.usable_channels()
     ready = (usable & correction_inputs.ready).sum(axis=0)
     settling = (usable & np.isfinite(tracks.age_s) & ~correction_inputs.ready).sum(axis=0)
-    short = corrections.count < params.min_receivers
-    waiting = short & (ready < params.min_receivers) & (ready + settling >= params.min_receivers)
+    short = corrections.count < params.receivers.minimum
+    waiting = short & (ready < params.receivers.minimum) & (ready + settling >= params.receivers.minimum)
     unmonitored = (
-        waiting & ~correction_inputs.judged & ((usable & correction_inputs.settled).sum(axis=0) >= params.min_receivers)
+        waiting
+        & ~correction_inputs.judged
+        & ((usable & correction_inputs.settled).sum(axis=0) >= params.receivers.minimum)
     )
     channel_cause = _channel_cause(tracked, exclusions)
     no_rate = ~np.isfinite(corrections.prc_m + corrections.rrc_mps).all(axis=0)
@@ -67,7 +69,7 @@ def satellite_status(
         (unmonitored, ChannelState.SETTLING, ExclusionCause.UNMONITORED),
         (waiting, ChannelState.SETTLING, ExclusionCause.SETTLING),
         (short & (channel_cause >= float(FIRST_LATCHED)), excluded, channel_cause),
-        (short & (ready >= params.min_receivers), excluded, ExclusionCause.TOO_FEW_COMMON_SATELLITES),
+        (short & (ready >= params.receivers.minimum), excluded, ExclusionCause.TOO_FEW_COMMON_SATELLITES),
         (short, excluded, ExclusionCause.TOO_FEW_RECEIVERS),
         (~_sigma_fits(corrections), excluded, ExclusionCause.SIGMA_TOO_LARGE),
         (no_rate, excluded, ExclusionCause.NO_RATE),
@@ -126,7 +128,7 @@ def integrity_of(
     def of_usable(values: FloatArray) -> FloatArray:
         return np.where(usable, values, np.nan)
 
-    external = bool(params.external_monitor)
+    external = bool(params.ephemeris.external_monitor)
     n_receivers = corrections.used.shape[0]
     used, b = missing(MAX_REFERENCE_RECEIVERS), missing(MAX_REFERENCE_RECEIVERS)
     used[:n_receivers] = of_row((corrections.used & usable).astype(np.float64))
@@ -139,9 +141,9 @@ def integrity_of(
         state=of_row(status.state),
         cause=of_row(status.cause),
         elevation_rad=of_row(correction_inputs.elevation_rad),
-        p_ephemeris=of_usable(claimed_decorrelation(orbit_bound, params.p_ephemeris, external=external)),
+        p_ephemeris=of_usable(claimed_decorrelation(orbit_bound, params.ephemeris.p, external=external)),
         p_ephemeris_d=of_usable(
-            claimed_decorrelation(orbit_bound, params.p_ephemeris_d or params.p_ephemeris, external=external)
+            claimed_decorrelation(orbit_bound, params.ephemeris.p_d or params.ephemeris.p, external=external)
         ),
         iod=of_row(known.current.iod),
         ephemeris_crc=of_row(known.crc),

@@ -62,11 +62,11 @@ class Places:
 def places_of(params: GroundParams) -> Places:
     """Places along every approach from the threshold to the largest distance of use."""
     section, station = params.ionosphere, params.reference_point_m()
-    enu = rot_enu_ecef(params.latitude_rad, params.longitude_rad)
+    enu = rot_enu_ecef(params.station.latitude_rad, params.station.longitude_rad)
     rows: list[tuple[Any, ...]] = []
     for approach in params.approaches:
         decision_m = decision_distance_m(approach, section.decision_height_m)
-        outer_m = params.max_use_distance_m + float(np.linalg.norm(approach.ltp_ecef_m - station))
+        outer_m = params.station.max_use_distance_m + float(np.linalg.norm(approach.ltp_ecef_m - station))
         distances = sorted({0.0, decision_m, outer_m, *(each for each in _DISTANCES_M if decision_m < each < outer_m)})
         for distance_m, beyond_m in zip(distances, [*distances[1:], outer_m], strict=True):
             away_m = approach.position_on_path(distance_m) - station
@@ -118,13 +118,12 @@ def decision_distance_m(approach: FinalApproach, height_m: float) -> float:
 
 def credit_of(params: GroundParams) -> DivergenceCredit | None:
     """What the station's divergence monitor excludes for certain; None when it excludes nothing."""
-    ccd = params.monitors.ccd
+    ccd = params.ccd
     if not ccd.exclude:
         return None
-    monitor = ccd.params(params.settle_time_s, params.max_gap_s)
     return DivergenceCredit(
-        threshold_mps=monitor.threshold_mps,
-        margin_mps=params.ionosphere.k_missed_detection * monitor.sigma_mps,
+        threshold_mps=ccd.threshold_mps,
+        margin_mps=params.ionosphere.k_missed_detection * ccd.sigma_mps,
         tau_s=ccd.tau_s,
-        readmission_s=params.readmission_time_s,
+        readmission_s=params.monitors.readmission_time_s,
     )

@@ -26,7 +26,9 @@ from gbas_ground.ionosphere.geometry_screening import Cases, judge, least_safe, 
 from gbas_ground.ionosphere.places import Places, places_of
 from gbas_ground.ionosphere.range_error import worst_range_error_m
 from gbas_ground.ionosphere.threat import FrontThreat
-from gbas_ground.params import MAX_SIGMA_VIG, MIN_SERVICE_SATELLITES, GroundParams
+from gbas_ground.param_checks import MIN_SERVICE_SATELLITES
+from gbas_ground.params import GroundParams
+from gbas_ground.sections import MAX_SIGMA_VIG
 
 _VIG_STEP: Final = 1.0e-7  # resolution of the type 2 message
 _VIG_STEPS: Final = round(MAX_SIGMA_VIG / _VIG_STEP)
@@ -115,7 +117,7 @@ def protect(
     params : GroundParams
     """
     if not params.ionosphere.protects:
-        return state, Protection(sigma_vig=params.sigma_vert_iono_gradient, shape_m=np.zeros(N_SATS))
+        return state, Protection(sigma_vig=params.atmosphere.sigma_vert_iono_gradient, shape_m=np.zeros(N_SATS))
     if np.count_nonzero(sent) < MIN_SERVICE_SATELLITES:  # nobody has a position; the most cautious values
         return _interrupted(state, key), Protection(sigma_vig=MAX_SIGMA_VIG, shape_m=np.zeros(N_SATS))
     before = state.protection
@@ -182,7 +184,7 @@ class _Screening:
     def of(cls, sent: BoolArray, sky: Sky, params: GroundParams) -> _Screening:
         satellites = np.flatnonzero(sent)
         section = params.ionosphere
-        letters = [each for each in params.systems if (SYSTEM_MASKS[each] & sent).any()]
+        letters = [each for each in params.station.systems if (SYSTEM_MASKS[each] & sent).any()]
         groups = np.array([SYSTEM_MASKS[each][satellites] for each in letters])
         subsets = subsets_of(groups, _combinations(letters, section.aircraft_systems), section.max_missing)
         return cls(satellites=satellites, cases=cases_of(satellites, sky, params), groups=groups, subsets=subsets)
@@ -259,27 +261,31 @@ def cases_of(satellites: NDArray[np.int64], sky: Sky, params: GroundParams) -> C
     params : GroundParams
     """
     elevation, azimuth, base, receivers = (each[satellites] for each in sky)
-    section, mask, places = params.ionosphere, params.elevation_mask_rad, places_of(params)
+    section, mask, places = params.ionosphere, params.monitors.elevation_mask_rad, places_of(params)
     up = np.stack([np.cos(elevation) * np.sin(azimuth), np.cos(elevation) * np.cos(azimuth), np.sin(elevation)])
     air = np.stack([sigma_air(aad, elevation, mask_rad=mask) for aad in _DESIGNATORS])
     tropo = sigma_tropo_m(
-        params.refractivity_uncertainty, params.scale_height_m, elevation, places.height_m[:, np.newaxis], mask_rad=mask
+        params.atmosphere.refractivity_uncertainty,
+        params.atmosphere.scale_height_m,
+        elevation,
+        places.height_m[:, np.newaxis],
+        mask_rad=mask,
     )
     speed, slant = places.speed_mps[:, np.newaxis], places.slant_m[:, np.newaxis]
-    error = range_errors_m(places, elevation, azimuth, section.threat(), params.tau_s[0])
+    error = range_errors_m(places, elevation, azimuth, section.threat(), params.smoothing.tau_s[0])
     return Cases(
         los=places.los_axes @ up,
         tan_gpa=places.tan_gpa,
         base_m=base,
         air2_m2=air[places.designator_b.astype(np.int64)] ** 2 + tropo**2,
-        iono_m=sigma_iono_m(1.0, elevation, slant, speed, params.tau_s[0], mask_rad=mask),
+        iono_m=sigma_iono_m(1.0, elevation, slant, speed, params.smoothing.tau_s[0], mask_rad=mask),
         error_m=error,
         shape_m=error[places.decision].max(axis=0),
         limit_m=places.limit_m,
         tolerable_m=places.tolerable_m,
         k_ffmd=_least_k_ffmd(receivers),
         k_noise=section.k_noise,
-        nominal_vig=params.sigma_vert_iono_gradient,
+        nominal_vig=params.atmosphere.sigma_vert_iono_gradient,
         affected=section.affected,
     )
 
@@ -304,5 +310,5 @@ def protection_in_words(params: GroundParams) -> str:
     )
     return (
         f"ionospheric fronts of the {threat.name} model (up to {steepest:g} mm/km on {satellites} at once): {bound} "
-        f"within {params.max_use_distance_m / 1000.0:g} km on the approaches"
+        f"within {params.station.max_use_distance_m / 1000.0:g} km on the approaches"
     )

@@ -22,14 +22,16 @@ Jiang, Milner, Macabiau, ENC 2015 (budget). The removal of the clocks and the th
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Final, Literal, NamedTuple
+from functools import cached_property
+from typing import Annotated, Final, Literal, NamedTuple
 
 import numpy as np
 from scipy.stats import binom
 
+from gbas_core.parameters import Derived, Parameter, ParameterError, parameters
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import N_SATS
-from gbas_core.signals import L1, L5
+from gbas_core.signals import L1, L5, N_BANDS
 from gbas_ground.monitors.carrier_noise import CarrierNoise
 from gbas_ground.monitors.expected_range import row_median
 from gbas_ground.monitors.false_alarm import EPOCH_S, EXPOSURE_S, FALSE_EXCLUSION, false_alarm_multiplier
@@ -37,6 +39,7 @@ from gbas_ground.monitors.result import MonitorResult, upper_limit
 
 STATISTICS: Final = ("step_m", "rate_mps", "acceleration_mps2")
 Fault = Literal["step", "ramp", "acceleration"]
+Triple = tuple[float, float, float]
 _LEAST_POINTS: Final = 4  # a parabola and one to spare
 _MOST_OTHERS: Final = 35
 FAULT_RATE_PER_H: Final = 1e-5
@@ -64,66 +67,52 @@ def fewest_others(p_false_alarm: float) -> int:
 FEWEST_OTHERS: Final = fewest_others(FALSE_EXCLUSION)
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class CarrierAccelerationParams:
-    """Settings of the acceleration monitor.
+    """Step, rate and acceleration of the carriers.
 
-    Attributes
-    ----------
-    bands : tuple of int
-        Carriers tested; the first one is due wherever a channel is, the others where there are epochs enough.
-    points : int
-        Most epochs in the fit.
-    window_s : float
-        Oldest epoch in the fit [s].
-    least_points : int
-        Fewest epochs a channel is judged by.
-    min_satellites : int
-        Fewest others a receiver's clock is taken from (:func:`fewest_others`).
-    max_gap_s : float
-        Longest gap a channel's fit goes across [s].
-    noise : CarrierNoise
-        Noise between epochs: white, so less than that of the gradient monitor, which has slow multipath in it.
-    common : tuple of float
-        Sigma of step [m], rate [m/s] and acceleration [m/s^2] that all receivers share: satellite clock, ionosphere.
-        Uncertain, ours.
-    natural : tuple of float
-        Largest step, rate and acceleration that are no fault. Uncertain, ours: 0.1 m/s is more than the ionosphere did
-        in the storm of 30 October 2003 (0.06 to 0.09 m/s on L1), and enters and leaves the corrections as it should.
-    p_false_alarm : float
-        For one source in 15 s, over all statistics, bands and receivers.
-    interval_s : float
-        Between epochs, for the budget [s].
+    The noise is that between epochs: white, so less than that of the gradient monitor, which has slow multipath in it.
+    What the receivers share (satellite clocks, ionosphere) and what is natural are uncertain, ours: 0.1 m/s is more
+    than the ionosphere did in the storm of 30 October 2003 (0.06 to 0.09 m/s on L1), and enters and leaves the
+    corrections as it should. The first of the bands is due wherever a channel is, the others where there are epochs
+    enough.
     """
 
-    bands: tuple[int, ...] = (L1, L5)
-    points: int = 10
-    window_s: float = 5.0
-    least_points: int = 5
-    min_satellites: int = FEWEST_OTHERS
-    max_gap_s: float = 3.5
-    noise: CarrierNoise = CarrierNoise(floor_m=(0.0015, 0.0015, 0.003), low_m=(0.006, 0.006, 0.010))
-    common: tuple[float, float, float] = (0.0015, 0.001, 0.0005)
-    natural: tuple[float, float, float] = (0.0, 0.1, 0.005)
-    p_false_alarm: float = FALSE_EXCLUSION
-    interval_s: float = EPOCH_S
+    exclude: Annotated[bool, Parameter("satellites and channels that fail are excluded")] = True
+    window_s: Annotated[float, Parameter("oldest epoch in the fit", "s", 1.0, 600.0)] = 5.0
+    points: Annotated[int, Parameter("most epochs in the fit", "-", _LEAST_POINTS, 120)] = 10
+    least_points: Annotated[int, Parameter("fewest epochs in it", "-", _LEAST_POINTS, 120)] = 5
+    min_satellites: Annotated[
+        int, Parameter("others a receiver's clock is taken from (fewest_others)", "-", 2, 35)
+    ] = FEWEST_OTHERS  # fmt: skip
+    common: Annotated[
+        Triple, Parameter("sigma of step, rate and acceleration that all receivers share", "m, m/s, m/s2", 0.0, 1.0)
+    ] = (0.0015, 0.001, 0.0005)
+    natural: Annotated[
+        Triple, Parameter("largest step, rate and acceleration that are no fault", "m, m/s, m/s2", 0.0, 10.0)
+    ] = (0.0, 0.1, 0.005)
+    p_false_alarm: Annotated[
+        float, Parameter("of one source in 15 s, over all statistics, bands and receivers", "-", 1e-12, 0.5)
+    ] = FALSE_EXCLUSION
+    max_gap_s: Annotated[float, Derived("longest gap, that of the smoothing", "s", 0.1, 3600.0)] = 3.5
+    receiver_factor: Annotated[
+        tuple[float, ...], Derived("on the sigma of rr1, rr2, ..., or one for all", "-", 0.1, 10.0)
+    ] = (1.0,)
+    bands: Annotated[tuple[int, ...], Derived("carriers tested", "-", 0, N_BANDS - 1)] = (L1, L5)
+    interval_s: Annotated[float, Derived("between epochs, for the budget", "s", 0.01, 3600.0)] = EPOCH_S
 
     def __post_init__(self) -> None:
         if not self.bands or len(set(self.bands)) != len(self.bands):
-            raise ValueError(f"acceleration: bands is {self.bands}: at least one, each once")
-        if not _LEAST_POINTS <= self.least_points <= self.points:
-            raise ValueError(
-                f"acceleration: least_points is {self.least_points}: from {_LEAST_POINTS} to points, {self.points}"
-            )
-        if self.min_satellites < 2:
-            raise ValueError(f"acceleration: min_satellites is {self.min_satellites}: at least 2 are needed")
-        for name in ("window_s", "max_gap_s", "interval_s"):
-            if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
-                raise ValueError(f"acceleration: {name} is {getattr(self, name)}: it must be above 0 s")
-        for name in ("common", "natural"):
-            if not all(np.isfinite(value) and value >= 0.0 for value in getattr(self, name)):
-                raise ValueError(f"acceleration: {name} is {getattr(self, name)}: finite and not negative")
-        false_alarm_multiplier(self.p_false_alarm)
+            raise ParameterError(f"bands = {self.bands} is not one or more, each once")
+        if self.least_points > self.points:
+            raise ParameterError(f"least_points = {self.least_points} is more than points = {self.points}")
+
+    @cached_property
+    def noise(self) -> CarrierNoise:
+        """Noise between epochs."""
+        return CarrierNoise(
+            floor_m=(0.0015, 0.0015, 0.003), low_m=(0.006, 0.006, 0.010), receiver_factor=self.receiver_factor
+        )
 
     def multiplier(self, n_receivers: int) -> float:
         """Standard deviations of every threshold: each channel and the average can exclude the source."""

@@ -10,9 +10,11 @@ Source: Jiang, Milner, Macabiau, ENC 2015, eq (1) to (4) and 2.1.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
+from gbas_core.parameters import Derived, Parameter, parameters
 from gbas_core.ranging.combinations import code_minus_carrier
 from gbas_core.ranging.divergence import (
     GROUND,
@@ -26,37 +28,42 @@ from gbas_core.ranging.divergence import (
 )
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.signals import N_BANDS
+from gbas_ground.monitors.false_alarm import exposure_probability, least_correlation
 from gbas_ground.monitors.result import MonitorResult, upper_limit
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class CcdParams:
-    """What the monitor is set to.
-
-    Attributes
-    ----------
-    filters : DivergenceParams
-    threshold_mps : float
-        Of the mean over receivers [m/s].
-    sigma_mps : float
-        Bound on the statistic's standard deviation, ionosphere included: what the threshold was made from [m/s].
+    """Single-band code-carrier divergence (GAST-D).
 
     Notes
     -----
     The paper calls 0.0233 m/s the threshold for a false alarm probability of 1e-9 at sigma 0.00399 m/s. It is 5.840
     sigma, which is 2.6e-9 one-sided; 1e-9 takes 0.02393 m/s one-sided and 0.02438 m/s two-sided. The lower threshold
     is kept: it detects earlier.
+
+    The filters settle with those of the smoothing: after 207 s both have forgotten their start to 1 %
+    (:mod:`gbas_core.ranging.divergence`), less than the 230 s of docs/decisions/0002.
     """
 
-    filters: DivergenceParams = GROUND
-    threshold_mps: float = GROUND_THRESHOLD_MPS
-    sigma_mps: float = GROUND_SIGMA_MPS
+    exclude: Annotated[bool, Parameter("satellites that fail are excluded")] = True
+    tau_s: Annotated[float, Parameter("time constant of both filters", "s", 1.0, 1000.0)] = 30.0
+    settle_s: Annotated[
+        float, Parameter("time a filter has to run, where that is more than smoothing.settle_time_s", "s", 0.0, 3600.0)
+    ] = 0.0
+    threshold_mps: Annotated[float, Parameter("of the mean over receivers", "m/s", 1e-4, 10.0)] = GROUND_THRESHOLD_MPS
+    sigma_mps: Annotated[
+        float,
+        Parameter(
+            "bound on the standard deviation of that mean, ionosphere included: with the threshold, the false "
+            "exclusions", "m/s", 1e-5, 1.0,
+        ),
+    ] = GROUND_SIGMA_MPS  # fmt: skip
+    filters: Annotated[DivergenceParams, Derived("of tau_s, settle_s and the longest gap of the smoothing")] = GROUND
 
-    def __post_init__(self) -> None:
-        for name in ("threshold_mps", "sigma_mps"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0.0):
-                raise ValueError(f"{name} is {value}: it must be above 0 m/s")
+    def p_false_exclusion(self) -> float:
+        """Of one source in 15 s: 9.1e-8 for the published threshold and sigma, as of 17 independent samples."""
+        return exposure_probability(self.threshold_mps / self.sigma_mps, least_correlation(self.tau_s))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -2,10 +2,21 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import numpy as np
 
+from gbas_core.parameters import Parameter, parameters
 from gbas_core.record import BoolArray, FloatArray
 from gbas_ground.monitors.result import MonitorResult, upper_limit
+
+
+@parameters
+class CorrectionLimitsParams:
+    """Limits of the corrections."""
+
+    max_prc_m: Annotated[float, Parameter("limit of |PRC|", "m", 1.0, 327.67)] = 327.67
+    max_rrc_mps: Annotated[float, Parameter("limit of |RRC|", "m/s", 0.01, 32.767)] = 3.4
 
 
 def check_correction(correction: FloatArray, applies: BoolArray, limit: float) -> MonitorResult:

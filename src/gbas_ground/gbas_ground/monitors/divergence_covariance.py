@@ -23,6 +23,8 @@ from gbas_core.record import FloatArray
 
 Matrix3 = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
 Triple = tuple[float, float, float]
+Triangle = tuple[float, float, float, float, float, float]
+_UPPER: Final = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 
 # Known: ENC 2015, eq (18) [(m/s)^2]: DF1, DF5, IF code, IF carrier, of one receiver with a multipath limiting antenna.
 PRINTED_COVARIANCE: Final[FloatArray] = 1e-5 * np.array(
@@ -38,6 +40,17 @@ INDEPENDENT: Final = (0, 1, 3)
 
 
 _ZERO: Final[Matrix3] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+def triangle(matrix: Matrix3) -> Triangle:
+    """Upper triangle of a symmetric matrix, by rows."""
+    return tuple(matrix[row][column] for row, column in _UPPER)  # type: ignore[return-value]
+
+
+def matrix_of(values: Triangle) -> Matrix3:
+    """Symmetric matrix of an upper triangle."""
+    a, b, c, d, e, f = values
+    return ((a, b, c), (b, d, e), (c, e, f))
 
 
 def _matrix3(values: FloatArray) -> Matrix3:

@@ -28,14 +28,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Final
+from typing import Annotated, Final
 
 import numpy as np
 from scipy.stats import norm
 
+from gbas_core.parameters import Derived, Parameter, ParameterError, parameters
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import N_SATS
-from gbas_core.signals import L1, L5, WAVELENGTH_M
+from gbas_core.signals import L1, L5, N_BANDS, WAVELENGTH_M
 from gbas_ground.monitors.carrier_noise import CarrierNoise
 from gbas_ground.monitors.double_difference import Baselines, DoubleDifferences, decided
 from gbas_ground.monitors.false_alarm import FALSE_EXCLUSION, false_alarm_multiplier
@@ -48,40 +49,38 @@ epoch's.
 _PARALLEL: Final = 1e-6  # sine of the angle below which two baselines, seen from the satellite, are one
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class EphemerisResidualParams:
-    """Settings of the ephemeris monitor.
+    """Broadcast orbits against double-difference carriers, which are those of the gradient monitor.
 
-    Attributes
-    ----------
-    bands : tuple of int
-        Carriers of the double differences.
-    p_false_alarm : float
-        For one source in 15 s, over all baselines and bands.
-    p_missed_detection : float
-        Of the orbit error that P is claimed for. Uncertain.
-    max_gap_s : float
-        Longest gap a double difference is followed across [s]: orbits move it by millimetres a minute.
-    required : bool
-        Satellites that are due and have no double difference fail.
+    What a satellite that is not monitored may be used for is the station's business. Orbits move a double difference by
+    millimetres a minute.
     """
 
-    bands: tuple[int, ...] = (L1, L5)
-    p_false_alarm: float = FALSE_EXCLUSION
-    p_missed_detection: float = 1.0e-4
-    max_gap_s: float = 60.0
-    required: bool = True
+    exclude: Annotated[bool, Parameter("satellites that fail are excluded")] = True
+    required: Annotated[
+        bool,
+        Parameter(
+            "satellites whose orbits it does not bound within the largest P are not used; always so with gast_d.enabled"
+        ),
+    ] = False
+    p_false_alarm: Annotated[
+        float, Parameter("of one source in 15 s, over all baselines and bands", "-", 1e-12, 0.5)
+    ] = FALSE_EXCLUSION
+    p_missed_detection: Annotated[
+        float, Parameter("of an orbit error P is claimed for (uncertain)", "-", 1e-12, 0.5)
+    ] = 1e-4
+    max_gap_s: Annotated[float, Parameter("longest gap a double difference is followed across", "s", 0.1, 3600.0)] = (
+        60.0
+    )
+    bands: Annotated[tuple[int, ...], Derived("those of the gradient monitor", "-", 0, N_BANDS - 1)] = (
+        L1,
+        L5,
+    )
 
     def __post_init__(self) -> None:
         if not self.bands or len(set(self.bands)) != len(self.bands):
-            raise ValueError(f"ephemeris residual: bands is {self.bands}: at least one, each once")
-        if not 0.0 < self.p_missed_detection < 0.5:
-            raise ValueError(
-                f"ephemeris residual: p_missed_detection is {self.p_missed_detection}: it must be between 0 and 0.5"
-            )
-        if not (np.isfinite(self.max_gap_s) and self.max_gap_s > 0.0):
-            raise ValueError(f"ephemeris residual: max_gap_s is {self.max_gap_s}: it must be above 0 s")
-        false_alarm_multiplier(self.p_false_alarm)
+            raise ParameterError(f"bands = {self.bands} is not one or more, each once")
 
     def multiplier(self, n_baselines: int) -> float:
         """Standard deviations of the threshold."""
@@ -159,7 +158,7 @@ def ephemeris_residual_step(
     threshold = params.multiplier(len(baselines)) * differences.sigma_m
     statistic, limit = decided(np.abs(followed), threshold)
     new = EphemerisResidualState(followed_m=np.where(there, followed, before), unseen_s=np.where(there, 0.0, elapsed))
-    applies = due if params.required else due & np.isfinite(statistic)
+    applies = due & np.isfinite(statistic)
     return new, upper_limit(statistic, limit, applies)
 
 

@@ -2,11 +2,23 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import numpy as np
 
+from gbas_core.parameters import Parameter, parameters
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import CLOCK_GROUPS
 from gbas_ground.monitors.result import MonitorResult, upper_limit
+
+
+@parameters
+class ExpectedRangeParams:
+    """Raw pseudoranges against the expected ones."""
+
+    max_residual_m: Annotated[
+        float, Parameter("raw pseudorange against the expected one", "m", 10.0, 10_000.0)
+    ] = 150.0  # fmt: skip
 
 
 def check_expected_range(raw_correction_m: FloatArray, tracked: BoolArray, limit_m: float) -> MonitorResult:

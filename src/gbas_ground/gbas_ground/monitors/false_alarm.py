@@ -15,6 +15,8 @@ import numpy as np
 from scipy.special import chdtrc, chndtr
 from scipy.stats import chi2, norm
 
+from gbas_core.ranging.divergence import white_noise_correlation
+
 FALSE_EXCLUSION: Final = 1.0e-8
 """False exclusions of one source by one monitor in :data:`EXPOSURE_S`. Known: 2e-7 for all monitors together, a
 twentieth of it for each; Jiang, Milner, Macabiau, ENC 2015."""
@@ -111,3 +113,8 @@ def exposure_probability(
 def independent_samples(limit: float, correlation: float, *, freedom: int = 1) -> float:
     """Independent samples in the exposure that pass a threshold as often as the correlated statistic does [-]."""
     return exposure_probability(limit, correlation, freedom=freedom) / float(chdtrc(freedom, limit**2))
+
+
+def least_correlation(tau_s: float) -> float:
+    """Least correlation of a filtered rate between a station's epochs: that of noise without memory [-]."""
+    return white_noise_correlation(min(1.0, EPOCH_S / tau_s))

@@ -28,13 +28,15 @@ L1 grows in the direction of the runway's bearing.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Final
+from functools import cached_property
+from typing import Annotated, Final
 
 import numpy as np
 from scipy.stats import norm
 
+from gbas_core.parameters import Derived, Parameter, ParameterError, parameters
 from gbas_core.record import BoolArray, FloatArray, IntArray
-from gbas_core.signals import L1, L5, WAVELENGTH_M
+from gbas_core.signals import BAND_INDEX, WAVELENGTH_M, Band
 from gbas_ground.monitors.carrier_noise import CarrierNoise
 from gbas_ground.monitors.double_difference import Baselines, DoubleDifferences, Pairing, baselines_of, decided
 from gbas_ground.monitors.false_alarm import FALSE_EXCLUSION, false_alarm_multiplier
@@ -54,63 +56,49 @@ _LEVEL: Final = 1.05  # sigmas are rounded up by at most this factor when the co
 _PER_STEP: Final = float(1.0 / np.log(_LEVEL))
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class IonosphereGradientParams:
-    """Settings of the gradient monitor.
+    """Absolute slant ionosphere gradient.
 
-    Attributes
-    ----------
-    runway_bearing_rad : tuple of float
-        True bearings of the runways gradients are monitored along; coverage is that of the worst [rad].
-    bands : tuple of int
-        Carriers used; a satellite without one of them is monitored with the others.
-    pairing : {"all", "star"}
-        Baselines, see :func:`~gbas_ground.monitors.double_difference.baselines_of`.
-    fuse : {"any", "all"}
-        A satellite fails when one of its baselines fails, or when all do. Bands are always "any".
-    references : int
-        Reference satellites of a constellation. Ours.
-    noise : CarrierNoise
-    p_false_alarm : float
-        For one source in 15 s, over all its baselines and bands.
-    p_missed_detection : float
-        Of a gradient that counts as detectable. Uncertain: the paper does not print it.
-    gradient_range : pair of float
-        Gradients coverage is counted over [m/m].
-    min_coverage : float
-        Share of `gradient_range` a satellite's baselines have to detect for it to count as monitored; always more than
-        nothing. 0 claims nothing: a station that claims a bound on the gradient must set it.
-    required : bool
-        Satellites that are due and not monitored fail.
+    A satellite without one of the bands is monitored with the others; bands are always fused by "any". What a satellite
+    that is not monitored may be used for is the station's business. A coverage of 0 claims nothing: a station that
+    claims a bound on the gradient must set it.
     """
 
-    runway_bearing_rad: tuple[float, ...]
-    bands: tuple[int, ...] = (L1, L5)
-    pairing: Pairing = "all"
-    fuse: Fuse = "any"
-    references: int = 5
-    noise: CarrierNoise = CarrierNoise()
-    p_false_alarm: float = FALSE_EXCLUSION
-    p_missed_detection: float = P_MISSED_DETECTION
-    gradient_range: tuple[float, float] = GRADIENT_RANGE
-    min_coverage: float = 0.0
-    required: bool = True
+    exclude: Annotated[bool, Parameter("satellites that fail are excluded")] = True
+    required: Annotated[
+        bool, Parameter("satellites it cannot judge are not used; always so with gast_d.enabled")
+    ] = False  # fmt: skip
+    carriers: Annotated[tuple[Band, ...], Parameter("carriers used")] = ("L1", "L5")
+    pairing: Annotated[Pairing, Parameter("baselines: all, or from rr1 only")] = "all"
+    fuse: Annotated[Fuse, Parameter("baselines that have to fail")] = "any"
+    references: Annotated[int, Parameter("reference satellites of a constellation", "-", 1, 12)] = 5
+    p_false_alarm: Annotated[
+        float, Parameter("of one source in 15 s, over all its baselines and bands", "-", 1e-12, 0.5)
+    ] = FALSE_EXCLUSION
+    p_missed_detection: Annotated[
+        float, Parameter("of a gradient counted as detectable (uncertain)", "-", 1e-12, 0.5)
+    ] = P_MISSED_DETECTION
+    gradient_range: Annotated[
+        tuple[float, float], Parameter("gradients to be detected, which coverage is counted over", "m/m", 0.0, 0.1)
+    ] = GRADIENT_RANGE
+    min_coverage: Annotated[
+        float, Parameter("share of them a satellite has to be monitored for; always more than nothing", "-", 0.0, 1.0)
+    ] = 0.0
+    runway_bearing_rad: Annotated[
+        tuple[float, ...], Parameter("true bearings; empty: the courses of the approaches", "deg", -360.0, 360.0)
+    ] = ()
+    noise: Annotated[CarrierNoise, Derived("of the receivers' carriers")] = CarrierNoise()
 
     def __post_init__(self) -> None:
-        if not self.runway_bearing_rad or not np.isfinite(self.runway_bearing_rad).all():
-            raise ValueError(f"gradient monitor: runway_bearing_rad is {self.runway_bearing_rad}: at least one, finite")
-        if not self.bands or len(set(self.bands)) != len(self.bands):
-            raise ValueError(f"gradient monitor: bands is {self.bands}: at least one, each once")
-        if self.fuse not in ("any", "all"):
-            raise ValueError(f"gradient monitor: fuse is {self.fuse!r}: it must be any or all")
-        if self.references < 1:
-            raise ValueError(f"gradient monitor: references is {self.references}: at least 1 is needed")
-        for name in ("p_false_alarm", "p_missed_detection"):
-            if not 0.0 < getattr(self, name) < 0.5:
-                raise ValueError(f"gradient monitor: {name} is {getattr(self, name)}: it must be between 0 and 0.5")
-        if not 0.0 <= self.min_coverage <= 1.0:
-            raise ValueError(f"gradient monitor: min_coverage is {self.min_coverage}: it must be from 0 to 1")
+        if not self.carriers or len(set(self.carriers)) != len(self.carriers):
+            raise ParameterError(f"carriers = {self.carriers} is not one or more, each once")
         check_gradient_range(self.gradient_range)
+
+    @cached_property
+    def bands(self) -> tuple[int, ...]:
+        """Carriers used, as places on the axis of the bands."""
+        return tuple(BAND_INDEX[carrier] for carrier in self.carriers)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -242,9 +230,8 @@ def check_ionosphere_gradient(
     statistic, limit = decided(by_baseline.statistic, threshold, params.fuse)
     monitored = (coverage > 0.0) & (coverage >= params.min_coverage) & np.isfinite(statistic)
     exceeded = due & (statistic > limit)
-    failed = exceeded | (due & ~monitored) if params.required else exceeded
     return GradientResult(
-        verdict=MonitorResult(statistic=statistic, threshold=limit, failed=failed),
+        verdict=MonitorResult(statistic=statistic, threshold=limit, failed=exceeded),
         by_baseline=by_baseline,
         monitored=monitored,
         coverage=coverage,

@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Annotated, Final
 
 import numpy as np
 
+from gbas_core.parameters import Parameter, parameters
 from gbas_core.record import BoolArray, FloatArray
 from gbas_ground.corrections.formation import clock_removed_sigma_m
 from gbas_ground.monitors.result import MonitorResult, upper_limit
 
 MAX_B_VALUE_M: Final = 6.35
 """Largest B value the type 1 message can carry. Source: ICAO Annex 10 vol. I, table B-63."""
+
+
+@parameters
+class BValueParams:
+    """B values against their sigma."""
+
+    k_b: Annotated[float, Parameter("multiplier of the B value threshold", "-", 1.0, 20.0)] = 5.5
 
 
 def channel_sigma_m(sigma_pr_gnd_m: FloatArray, count: FloatArray, weights: FloatArray) -> FloatArray:

@@ -15,11 +15,12 @@ numbers ours).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Annotated, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gbas_core.parameters import Derived, Parameter, ParameterError, parameters
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import N_SATS
 from gbas_core.signals import L1, L5, N_BANDS
@@ -41,61 +42,48 @@ _MINIMUM_DBHZ: Final = (
 )
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class PowerExpectationParams:
-    """Settings of the low power monitor.
+    """C/N0 against what is expected at the elevation.
 
-    Attributes
-    ----------
-    bands : tuple of int
-        Bands tested; the first one is due wherever a channel is, the others where they are measured.
-    elevation_rad : tuple of float
-        Nodes of the table, rising [rad].
-    minimum_dbhz : tuple of tuple of float
-        Minimum at the nodes, one row for each of the bands L1, L2, L5; constant outside the nodes [dB-Hz].
-    channel_margin_db : float
-        A single channel may be this much below the table: fading of one antenna [dB].
-    average_s : float
-        Time constant of the average [s]: at two epochs a second, a drop by twice the margin there is is found at once,
-        and one by 1.07 of it in 1.5 s.
-    learn : bool
-        Let what the receivers saw raise the minimum.
-    drop_db : float
-        Then a satellite may be this much below what was learnt at its elevation: satellites differ [dB].
-    learn_s : float
-        Time constant of what is learnt [s].
-    learnt_after_s : float
-        Time a bin has to be learnt for before it counts [s].
-    max_gap_s : float
-        Longest gap an average goes across [s].
+    The first of the bands is due wherever a channel is, the others where they are measured. With the average of 1 s, at
+    two epochs a second, a drop by twice the margin there is is found at once, and one by 1.07 of it in 1.5 s.
     """
 
-    bands: tuple[int, ...] = (L1, L5)
-    elevation_rad: tuple[float, ...] = _ELEVATION_RAD
-    minimum_dbhz: tuple[tuple[float, ...], ...] = _MINIMUM_DBHZ
-    channel_margin_db: float = 4.0
-    average_s: float = 1.0
-    learn: bool = False
-    drop_db: float = 6.0
-    learn_s: float = 86_400.0
-    learnt_after_s: float = 3600.0
-    max_gap_s: float = 3.5
+    exclude: Annotated[bool, Parameter("satellites and channels that fail are excluded")] = True
+    elevation_rad: Annotated[
+        tuple[float, ...], Parameter("nodes of the table, rising; constant beyond them", "deg", 0.0, 90.0)
+    ] = _ELEVATION_RAD
+    minimum_l1_dbhz: Annotated[tuple[float, ...], Parameter("at the nodes", "dB-Hz", 0.0, 70.0)] = _MINIMUM_DBHZ[0]
+    minimum_l2_dbhz: Annotated[tuple[float, ...], Parameter("at the nodes", "dB-Hz", 0.0, 70.0)] = _MINIMUM_DBHZ[1]
+    minimum_l5_dbhz: Annotated[tuple[float, ...], Parameter("at the nodes", "dB-Hz", 0.0, 70.0)] = _MINIMUM_DBHZ[2]
+    channel_margin_db: Annotated[
+        float, Parameter("a single channel may be this much lower: fading of one antenna", "dB", 0.0, 40.0)
+    ] = 4.0
+    average_s: Annotated[float, Parameter("time constant of the average", "s", 0.1, 600.0)] = 1.0
+    learn: Annotated[bool, Parameter("let what the receivers saw raise the minimum")] = False
+    drop_db: Annotated[
+        float, Parameter("a satellite may be this much below what was learnt: satellites differ", "dB", 0.1, 40.0)
+    ] = 6.0
+    learn_s: Annotated[float, Parameter("time constant of what is learnt", "s", 1.0, 1e7)] = 86_400.0
+    learnt_after_s: Annotated[float, Parameter("time a bin is learnt for before it counts", "s", 1.0, 1e7)] = 3600.0
+    max_gap_s: Annotated[float, Derived("longest gap, that of the smoothing", "s", 0.1, 3600.0)] = 3.5
+    bands: Annotated[tuple[int, ...], Derived("bands tested", "-", 0, N_BANDS - 1)] = (L1, L5)
 
     def __post_init__(self) -> None:
         nodes = np.array(self.elevation_rad)
-        if nodes.size == 0 or not np.isfinite(nodes).all() or (np.diff(nodes) <= 0.0).any():
-            raise ValueError(f"expected_power: elevation_rad is {self.elevation_rad}: at least one node, rising")
-        if len(self.minimum_dbhz) != N_BANDS or any(len(row) != nodes.size for row in self.minimum_dbhz):
-            raise ValueError(f"expected_power: minimum_dbhz is not {N_BANDS} rows of {nodes.size} nodes")
-        if not np.isfinite(np.array(self.minimum_dbhz)).all():
-            raise ValueError(f"expected_power: minimum_dbhz is {self.minimum_dbhz}: it must be finite")
+        if nodes.size == 0 or (np.diff(nodes) <= 0.0).any():
+            raise ParameterError("elevation_deg is not one node or more, rising")
+        for name in ("minimum_l1_dbhz", "minimum_l2_dbhz", "minimum_l5_dbhz"):
+            if len(getattr(self, name)) != nodes.size:
+                raise ParameterError(f"{name} = {getattr(self, name)} is not one number a node of elevation_deg")
         if not self.bands or len(set(self.bands)) != len(self.bands):
-            raise ValueError(f"expected_power: bands is {self.bands}: at least one, each once")
-        for name in ("average_s", "learn_s", "learnt_after_s", "max_gap_s", "drop_db"):
-            if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
-                raise ValueError(f"expected_power: {name} is {getattr(self, name)}: it must be above 0")
-        if not (np.isfinite(self.channel_margin_db) and self.channel_margin_db >= 0.0):
-            raise ValueError(f"expected_power: channel_margin_db is {self.channel_margin_db}: it must not be negative")
+            raise ParameterError(f"bands = {self.bands} is not one or more, each once")
+
+    @property
+    def minimum_dbhz(self) -> tuple[tuple[float, ...], ...]:
+        """Minimum at the nodes, one row for each of the bands L1, L2, L5 [dB-Hz]."""
+        return (self.minimum_l1_dbhz, self.minimum_l2_dbhz, self.minimum_l5_dbhz)
 
 
 def minimum_from_expectation(

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Final, NamedTuple
+from typing import Annotated, Final, NamedTuple
 
 import numpy as np
 from scipy.linalg import eigvalsh_tridiagonal
@@ -32,6 +32,7 @@ from scipy.optimize import brentq
 from scipy.special import ndtr
 from scipy.stats import chi2, norm
 
+from gbas_core.parameters import Parameter, ParameterError, parameters
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import N_SATS
 from gbas_ground.monitors.false_alarm import EXPOSURE_S, FALSE_EXCLUSION
@@ -40,44 +41,36 @@ from gbas_ground.monitors.result import MonitorResult, upper_limit
 _ROOT_2_PI: Final = float(np.sqrt(2.0 * np.pi))
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class SigmaMonitorParams:
-    """Settings of the sigma monitor.
+    """Mean and spread of the B values over time.
 
-    Attributes
-    ----------
-    window_s : tuple of float
-        Time constants of the windows, rising; each starts as a plain mean [s].
-    correlation_s : tuple of float
-        Correlation time of the B values of each smoothing constant, 100 and 30 s [s]: that of the filter and of a
-        minute or so of multipath. Uncertain, ours; two geodetic receivers of 2010 have some 90 s with either constant.
-        Too short a time raises false alarms, too long a time thresholds.
-    sample_s : float
-        Time between the B values of a channel that are taken [s]; those between would add next to nothing.
-    forget_s : float
-        A channel not seen for longer starts anew [s].
-    p_false_alarm : float
-        For one source in 15 s, over all windows, smoothing constants and receivers.
+    The correlation time is that of the filter and of a minute or so of multipath. Uncertain, ours; two geodetic
+    receivers of 2010 have some 90 s with either constant. Too short a time raises false alarms, too long a time
+    thresholds.
     """
 
-    window_s: tuple[float, ...] = (1800.0, 7200.0)
-    correlation_s: tuple[float, ...] = (160.0, 110.0)
-    sample_s: float = 50.0
-    forget_s: float = 1800.0
-    p_false_alarm: float = FALSE_EXCLUSION
+    exclude: Annotated[bool, Parameter("channels and receivers that fail are excluded")] = True
+    window_s: Annotated[
+        tuple[float, ...], Parameter("time constants; each starts as a plain mean", "s", 60.0, 86_400.0)
+    ] = (1800.0, 7200.0)
+    correlation_s: Annotated[
+        tuple[float, float],
+        Parameter("correlation time of the B values of each smoothing constant, 100 and 30 s", "s", 1.0, 3600.0),
+    ] = (160.0, 110.0)
+    sample_s: Annotated[
+        float, Parameter("between the values taken: those between would add next to nothing", "s", 0.5, 600.0)
+    ] = 50.0
+    forget_s: Annotated[float, Parameter("a channel not seen for longer starts anew", "s", 1.0, 86_400.0)] = 1800.0
+    p_false_alarm: Annotated[
+        float, Parameter("of one source in 15 s, over all windows, smoothing constants and receivers", "-", 1e-12, 0.5)
+    ] = FALSE_EXCLUSION
 
     def __post_init__(self) -> None:
-        for name in ("window_s", "correlation_s"):
-            values = getattr(self, name)
-            if not values or not all(np.isfinite(value) and value > 0.0 for value in values):
-                raise ValueError(f"sigma monitor: {name} is {values}: at least one, all above 0 s")
-        for name in ("sample_s", "forget_s"):
-            if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
-                raise ValueError(f"sigma monitor: {name} is {getattr(self, name)}: it must be above 0 s")
+        if not self.window_s:
+            raise ParameterError("window_s = () is not one time constant or more")
         if not self.sample_s <= min(self.window_s):
-            raise ValueError(f"sigma monitor: sample_s = {self.sample_s} is longer than the shortest window")
-        if not 0.0 < self.p_false_alarm < 0.5:
-            raise ValueError(f"sigma monitor: p_false_alarm is {self.p_false_alarm}: it must be between 0 and 0.5")
+            raise ParameterError(f"sample_s = {self.sample_s} is longer than the shortest window")
 
     def share(self, n_receivers: int) -> float:
         """False alarm probability of one statistic at one sample."""

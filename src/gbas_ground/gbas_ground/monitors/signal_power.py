@@ -2,8 +2,20 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
+from gbas_core.parameters import Parameter, parameters
 from gbas_core.record import BoolArray, FloatArray
 from gbas_ground.monitors.result import MonitorResult, upper_limit
+
+
+@parameters
+class SignalPowerParams:
+    """C/N0 against one limit for all elevations."""
+
+    exclude: Annotated[bool, Parameter("channels that fail are excluded")] = True
+    min_cn0_dbhz: Annotated[float, Parameter("lowest C/N0 of a channel in use", "dB-Hz", 0.0, 60.0)] = 30.0
+    require_cn0: Annotated[bool, Parameter("do not use a channel whose receiver gives no C/N0")] = True
 
 
 def check_signal_power(

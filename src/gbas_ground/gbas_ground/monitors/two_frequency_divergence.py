@@ -29,12 +29,15 @@ Source: Jiang, Milner, Macabiau, ENC 2015, eq (8) to (18).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from typing import Final, Literal
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Annotated, Final, Literal
 
 import numpy as np
 from scipy.special import chdtri
 
+from gbas_core.parameters import Derived, Parameter, ParameterError, parameters
 from gbas_core.ranging.combinations import divergence_free_cmc, iono_free_weights, ionosphere_free
 from gbas_core.ranging.divergence import (
     GROUND,
@@ -47,10 +50,17 @@ from gbas_core.ranging.divergence import (
 )
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import CLOCK_GROUPS, N_SATS
-from gbas_core.signals import BANDS, L1, L5, N_BANDS, SPEED_OF_LIGHT_MPS
+from gbas_core.signals import BAND_INDEX, L1, L5, SPEED_OF_LIGHT_MPS
 from gbas_ground.monitors.code_carrier_divergence import receiver_mean
-from gbas_ground.monitors.divergence_covariance import PRINTED_COVARIANCE, StatisticCovariance
+from gbas_ground.monitors.divergence_covariance import (
+    PRINTED_COVARIANCE,
+    StatisticCovariance,
+    Triangle,
+    matrix_of,
+    triangle,
+)
 from gbas_ground.monitors.expected_range import row_median
+from gbas_ground.monitors.false_alarm import exposure_probability, least_correlation
 from gbas_ground.monitors.result import MonitorResult, upper_limit
 
 Form = Literal["paper", "sound"]
@@ -61,6 +71,8 @@ _OBLIQUITY: Final = 0.002
 _MOST_SUSPECTS: Final = 4
 # Uncertain, ours: of the threshold; a satellite that is in no clock costs little, a faulty one that is in them much.
 _SUSPICION: Final = 0.5
+LARGEST_ZENITH_DELAY_M: Final = 5.0
+"""Air has 2.2 to 2.8 m."""
 _ALL: Final = np.ones((1, N_SATS), dtype=bool)
 _PRINTED_INVERSE: Final = np.linalg.pinv(PRINTED_COVARIANCE)
 
@@ -70,45 +82,95 @@ def threshold(form: Form, p_false_alarm: float) -> float:
     return float(chdtri(float(DEGREES_OF_FREEDOM[form]), p_false_alarm))
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class TwoFrequencyParams:
-    """What the monitor is set to.
+    """Code-carrier divergence on two bands (GAST-F).
 
-    Attributes
-    ----------
-    band, other : int
-        The two bands: L1 and L5 (with it E1 and E5a), or L1 and L2.
-    filters : DivergenceParams
-    p_false_alarm : float
-        An epoch and satellite [-].
-    min_clock_satellites : int
-        Fewest other satellites a receiver clock is averaged from.
-    zenith_delay_m : float
-        Troposphere at the station, removed from the carrier; at 5 degrees its rate reaches 0.03 m/s [m].
-    covariance : StatisticCovariance
-        Of the sound form.
+    The filters are those of the single-band monitor. The troposphere at the station is removed from the carrier: at 5
+    degrees its rate reaches 0.03 m/s.
     """
 
-    band: int = L1
-    other: int = L5
-    filters: DivergenceParams = GROUND
-    p_false_alarm: float = 1e-9
-    min_clock_satellites: int = 3
-    zenith_delay_m: float = 2.4
-    covariance: StatisticCovariance = field(default_factory=StatisticCovariance)
+    exclude: Annotated[
+        Literal["full_rank", "published", "none"], Parameter("form whose failures are excluded")
+    ] = "full_rank"  # fmt: skip
+    other_band: Annotated[Literal["L2", "L5"], Parameter("band beside L1")] = "L5"
+    p_false_alarm: Annotated[float, Parameter("of a satellite and epoch", "-", 1e-12, 0.5)] = 1e-9
+    min_clock_satellites: Annotated[
+        int, Parameter("fewest others a receiver's clock is averaged from", "-", 1, 35)
+    ] = 3  # fmt: skip
+    receiver_covariance: Annotated[
+        Triangle,
+        Parameter(
+            "of DF, DF other, IF carrier, upper triangle by rows: part of each receiver, divided by their number",
+            "(m/s)^2", -1.0, 1.0,
+        ),
+    ] = (0.0,) * 6  # fmt: skip
+    common_covariance: Annotated[
+        Triangle,
+        Parameter(
+            "likewise: part that the receivers share, never divided; the default is the published bound",
+            "(m/s)^2", -1.0, 1.0,
+        ),
+    ] = triangle(StatisticCovariance().common)  # fmt: skip
+    elevation_rad: Annotated[
+        tuple[float, ...],
+        Parameter("nodes of the factors, rising; empty: no dependence on elevation", "deg", 0.0, 90.0),
+    ] = ()
+    factor_df: Annotated[
+        tuple[float, ...], Parameter("on the standard deviation of DF at the nodes", "-", 0.01, 100.0)
+    ] = ()
+    factor_df_other: Annotated[tuple[float, ...], Parameter("of DF of the other band", "-", 0.01, 100.0)] = ()
+    factor_if_carrier: Annotated[tuple[float, ...], Parameter("of the IF carrier", "-", 0.01, 100.0)] = ()
+    filters: Annotated[DivergenceParams, Derived("those of the single-band monitor")] = GROUND
+    zenith_delay_m: Annotated[float, Derived("troposphere at the station", "m", 0.0, LARGEST_ZENITH_DELAY_M)] = 2.4
 
     def __post_init__(self) -> None:
-        for name in ("band", "other"):
-            if getattr(self, name) not in range(N_BANDS):
-                raise ValueError(f"{name} is {getattr(self, name)}: it must be an index of {', '.join(BANDS)}")
-        if self.band == self.other:
-            raise ValueError(f"band and other are both {BANDS[self.band]}: two are needed")
-        if not 0.0 < self.p_false_alarm < 1.0:
-            raise ValueError(f"p_false_alarm is {self.p_false_alarm}: it must be within 0 and 1")
-        if not self.min_clock_satellites >= 1:
-            raise ValueError(f"min_clock_satellites is {self.min_clock_satellites}: it must be at least 1")
-        if not 0.0 <= self.zenith_delay_m <= 5.0:
-            raise ValueError(f"zenith_delay_m is {self.zenith_delay_m}: it must be within 0 to 5 m")
+        for name in ("factor_df", "factor_df_other", "factor_if_carrier"):
+            if len(getattr(self, name)) != len(self.elevation_rad):
+                raise ParameterError(f"{name} = {getattr(self, name)} is not one number a node of elevation_deg")
+        _ = self.covariance  # what is none is refused here
+
+    @property
+    def band(self) -> int:
+        """First band: L1."""
+        return L1
+
+    @cached_property
+    def other(self) -> int:
+        """Second band: L5 (with it E5a), or L2."""
+        return BAND_INDEX[self.other_band]
+
+    @cached_property
+    def covariance(self) -> StatisticCovariance:
+        """Covariance of the statistics of the form of full rank."""
+        factors = (self.factor_df, self.factor_df_other, self.factor_if_carrier)
+        return StatisticCovariance(
+            receiver=matrix_of(self.receiver_covariance),
+            common=matrix_of(self.common_covariance),
+            elevation_rad=self.elevation_rad,
+            factor=tuple(zip(*factors, strict=True)),
+        )
+
+    def with_covariance(self, covariance: StatisticCovariance) -> TwoFrequencyParams:
+        """The same with another covariance."""
+        factors = [tuple(each) for each in zip(*covariance.factor, strict=True)] or [()] * 3
+        return replace(
+            self,
+            receiver_covariance=triangle(covariance.receiver),
+            common_covariance=triangle(covariance.common),
+            elevation_rad=covariance.elevation_rad,
+            factor_df=factors[0],
+            factor_df_other=factors[1],
+            factor_if_carrier=factors[2],
+        )
+
+    def p_false_exclusion(self, tau_s: float) -> float:
+        """Of one source in 15 s, by the form that excludes: 1.9e-8 for 1e-9 an epoch and filters of 30 s."""
+        if self.exclude == "none":
+            return 0.0
+        form: Form = "paper" if self.exclude == "published" else "sound"
+        limit = math.sqrt(threshold(form, self.p_false_alarm))
+        return exposure_probability(limit, least_correlation(tau_s), freedom=DEGREES_OF_FREEDOM[form])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

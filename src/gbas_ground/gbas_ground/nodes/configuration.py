@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any, Final
 
-import yaml
-
-from gbas_core.parameters import ParameterError
-from gbas_ground.params import GroundParams, ground_section
+from gbas_core.configuration import read_configuration
+from gbas_core.parameters import ParameterError, declared, merged, nested
+from gbas_ground.params import SECTION, GroundParams
 from gbas_node.node import GbasNode
 
-PREFIX: Final = "ground."
-_RECEIVERS: Final = "receivers.rr1_ecef_m"
+PREFIX: Final = f"{SECTION}."
 
 
 def station_params(node: GbasNode, config: str) -> GroundParams:
@@ -23,26 +20,12 @@ def station_params(node: GbasNode, config: str) -> GroundParams:
     ParameterError
         Naming the file, the parameter, its value and its bound.
     """
-    section: dict[str, Any] = {}
-    if config:
-        try:
-            section = dict(ground_section(yaml.safe_load(Path(config).read_text(encoding="utf-8")), config))
-        except (OSError, UnicodeDecodeError) as error:
-            raise ParameterError(f"{config}: cannot be read: {error}") from None
-        except yaml.YAMLError as error:
-            raise ParameterError(f"{config}: is not YAML: {error}") from None
-    overrides = node.overrides(PREFIX)
+    section: dict[str, Any] = read_configuration(config).section(SECTION) if config else {}
+    overrides = nested(node.overrides(PREFIX))
     if not section and not overrides:
         raise ParameterError("no station: give its file as parameter 'config', or parameters 'ground.*'")
-    station = GroundParams.from_mapping({**section, **overrides}, source=config or "ROS parameters")
-    _show(node, station)
+    station = GroundParams.from_mapping(merged(section, overrides), source=config or "ROS parameters")
+    for each in declared(station, PREFIX):
+        if each.value is not None:
+            node.declare_read_only(each.key, each.value, each.parameter.doc)
     return station
-
-
-def _show(node: GbasNode, station: GroundParams) -> None:
-    for spec, value in station.shown():
-        if spec.key != _RECEIVERS:  # one parameter a receiver, below
-            node.declare_read_only(PREFIX + spec.key, value, spec.doc)
-    for number, position in enumerate(station.receiver_ecef_m, start=1):
-        key = f"{PREFIX}receivers.rr{number}_ecef_m"
-        node.declare_read_only(key, tuple(float(each) for each in position), "antenna position, ECEF [m]")

@@ -22,7 +22,7 @@ from gbas_core.gnss.frames import azimuth_elevation, rot_enu_ecef
 from gbas_core.gnss.orbits import rotated_range
 from gbas_core.record import BoolArray, FloatArray, IntArray
 from gbas_core.satellites import N_SATS
-from gbas_core.signals import IONO_RATIO, WAVELENGTH_M
+from gbas_core.signals import BANDS, IONO_RATIO, WAVELENGTH_M
 from gbas_ground.monitors.double_difference import DoubleDifferences, double_differences, reference_satellites
 from gbas_ground.monitors.false_alarm import false_alarm_multiplier
 from gbas_ground.monitors.gradient_detectability import P_FALSE_ALARM
@@ -94,14 +94,14 @@ def elevations_of_a_day(station: GroundParams, world: WorldParams, step_s: float
     """Elevations ``(E, N)`` of the satellites of a world, from its start, above the station's mask; NaN below [rad]."""
     orbits = open_orbits(replace(world, flight=None, duration_s=DAY_S))
     here = station.reference_point_m()
-    rotation = rot_enu_ecef(station.latitude_rad, station.longitude_rad)
+    rotation = rot_enu_ecef(station.station.latitude_rad, station.station.longitude_rad)
     rows = []
     for since_s in np.arange(0.0, DAY_S, step_s):
         tow_s = world.start_tow_s + float(since_s)
         state = orbits.arc(world.start_week, tow_s)(np.full(N_SATS, tow_s))
         _, los = rotated_range(here, state.position_m)
         _, elevation = azimuth_elevation(rotation @ los)
-        high = elevation >= station.elevation_mask_rad
+        high = elevation >= station.monitors.elevation_mask_rad
         rows.append(np.where(high & orbits.transmitting(world.start_week, tow_s), elevation, np.nan))
     return np.array(rows)
 
@@ -191,7 +191,7 @@ def _trial(
         _differences(_carriers(sky, gradient, site, params, random), sky.elevation_rad, sky.references, site, params),
         sky.here,
         site,
-        replace(params, required=False),
+        params,
     )
     inside = np.zeros(N_SATS, dtype=np.bool_)
     inside[tried] = [not _within(gradient[each], sky.blind[int(each)]) for each in np.flatnonzero(tried)]
@@ -251,9 +251,8 @@ def site_with(
     station: GroundParams, receivers: int, bands: tuple[int, ...]
 ) -> tuple[GradientSite, IonosphereGradientParams]:
     """The station's monitor with its first receivers and these bands only."""
-    courses = tuple(each.course_rad for each in station.approaches)
-    noise = station.monitors.carrier_noise.params()
+    noise = station.carrier_noise
     if len(noise.receiver_factor) > 1:
         noise = replace(noise, receiver_factor=noise.receiver_factor[:receivers])
-    params = replace(station.monitors.gradient.params(courses, noise), bands=bands)
+    params = replace(station.gradient_monitor(), noise=noise, carriers=tuple(BANDS[band] for band in bands))
     return gradient_site(station.receiver_positions_m()[:receivers], station.reference_point_m(), params), params

@@ -80,7 +80,7 @@ def pair_series(chosen: RecordedSet, data: Path, n_epochs: int | None = None) ->
     """Run the monitor over a recorded pair, elevation mask 5 degrees, nominal troposphere."""
     recording = chosen.open(data)
     station = station_params(chosen.antennas_m(recording))
-    params = IonosphereGradientParams(runway_bearing_rad=(0.0,), bands=(L1, chosen.other), required=False)
+    params = IonosphereGradientParams(runway_bearing_rad=(0.0,), carriers=("L1", BANDS[chosen.other]))
     site = gradient_site(station.receiver_positions_m(), station.reference_point_m(), params)
     where, known = site_of(station), ephemerides.initial_ephemerides()
     queue: ReceptionQueue[Ephemeris] = ReceptionQueue()

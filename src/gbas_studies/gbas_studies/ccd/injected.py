@@ -69,7 +69,7 @@ def nominal_world(seconds: float, *, seed: int = 1, fronts: tuple[WedgeFront, ..
 def double_params(covariance: StatisticCovariance | None = None) -> TwoFrequencyParams:
     """The two-frequency monitor of this station."""
     params = TwoFrequencyParams(zenith_delay_m=ZENITH_DELAY_M)
-    return params if covariance is None else replace(params, covariance=covariance)
+    return params if covariance is None else params.with_covariance(covariance)
 
 
 def monitored(world: World, *, covariance: StatisticCovariance | None = None) -> MonitoredSeries:

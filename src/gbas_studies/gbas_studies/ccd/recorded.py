@@ -14,6 +14,7 @@ from gbas_core.gnss.ephemeris import Ephemeris
 from gbas_core.gnss.frames import geodetic_from_ecef
 from gbas_core.gnss.gpstime import epoch_key, from_epoch_key
 from gbas_core.io.recording import RecordedEpoch, Recording
+from gbas_core.parameters import made_of
 from gbas_core.ranging.divergence import DivergenceParams
 from gbas_core.ranging.slips import SlipParams, initial_slips, slip_step
 from gbas_core.record import BoolArray, FloatArray
@@ -208,7 +209,7 @@ def monitor_set(
 ) -> MonitoredSeries:
     """Run both monitors over a recorded set, receivers averaged, elevation mask 5 degrees."""
     recording = chosen.open(data)
-    params = replace(double or TwoFrequencyParams(), band=L1, other=chosen.other, filters=filters)
+    params = replace(double or TwoFrequencyParams(), other_band="L2" if chosen.other == L2 else "L5", filters=filters)
     return monitor_epochs(
         recording.epochs(), recording.ephemerides(), chosen.antennas_m(recording), CcdParams(filters=filters), params
     )
@@ -351,14 +352,18 @@ class _Run:
 def station_params(antennas_m: FloatArray) -> GroundParams:
     """A station at recorded antennas; only its geometry and its handling of ephemerides are used here."""
     latitude, longitude, height = (float(value) for value in geodetic_from_ecef(antennas_m[0]))
-    return GroundParams(
-        station_id="STDY",
-        latitude_rad=latitude,
-        longitude_rad=longitude,
-        height_m=height,
-        gcid=1,
-        receiver_ecef_m=tuple((float(x), float(y), float(z)) for x, y, z in antennas_m),
-        min_receivers=1,
-        slots="AB",
-        ephemeris_settle_s=0.0,
+    places = {f"receivers.rr{number}_ecef_m": place for number, place in enumerate(antennas_m.tolist(), start=1)}
+    return made_of(
+        GroundParams,
+        {
+            "station.id": "STDY",
+            "station.latitude_rad": latitude,
+            "station.longitude_rad": longitude,
+            "station.height_m": height,
+            "station.gcid": 1,
+            "receivers.minimum": 1,
+            "vdb.slots": "AB",
+            "ephemeris.settle_s": 0.0,
+            **places,
+        },
     )

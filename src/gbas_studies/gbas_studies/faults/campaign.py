@@ -18,7 +18,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from gbas_ground.params import GroundParams
+from gbas_ground.params import GroundParams, watching
 from gbas_sim.atmosphere.fronts import WedgeFront
 from gbas_sim.faults.kinds import (
     FAULT_MODES,
@@ -379,7 +379,7 @@ def _stations(world: WorldParams, station: GroundParams, watch: bool) -> list[Se
         raise StudyError("the station has no usable satellite after the quiet start")
     if not watch:
         return [acting]
-    return [acting, settle(world, replace(station, monitors=station.monitors.watching()), QUIET_S)]
+    return [acting, settle(world, watching(station), QUIET_S)]
 
 
 _prepared: list[Settled] = []

@@ -128,8 +128,8 @@ def range_errors(fronts: Sequence[WedgeFront], observed: Observed, station: Grou
     interval_s = observed.world.params.interval_s
     return RangeErrors(
         satellites=satellites,
-        smoothed_m=smoothed_m(delay, observed.tracked[..., list(satellites)], interval_s, station.tau_s[0]),
-        rate_mps=divergence_mps(delay[:, :-1], interval_s, station.monitors.ccd.tau_s),
+        smoothed_m=smoothed_m(delay, observed.tracked[..., list(satellites)], interval_s, station.smoothing.tau_s[0]),
+        rate_mps=divergence_mps(delay[:, :-1], interval_s, station.ccd.tau_s),
     )
 
 
@@ -162,8 +162,8 @@ def respond(
     error = errors.smoothed_m[:, -1] + _latest(correction, flight.age_s, interval_s)
     quiet = np.nan_to_num(flight.divergence_mps[..., satellites])
     rate = ((errors.rate_mps + quiet) * used).sum(axis=1) / behind
-    failed = (np.abs(rate) > station.monitors.ccd.threshold_mps) & station.monitors.ccd.exclude
-    excluded = _excluded(failed, interval_s, station.readmission_time_s)
+    failed = (np.abs(rate) > station.ccd.threshold_mps) & station.ccd.exclude
+    excluded = _excluded(failed, interval_s, station.monitors.readmission_time_s)
     out = np.zeros(flight.variance_m2.shape, dtype=bool)
     out[:, satellites] = excluded
     out[:, list(missing)] = True
