@@ -17,7 +17,7 @@ from gbas_core.parameters import Parameter, ParameterError, from_mapping, parame
 from gbas_core.ranging.slips import NORMAL_MANOEUVRE_JERK_MPS3
 from gbas_vdb.transmission.burst import SLOT_NAMES
 
-ROOT_KEY: Final = "airborne"
+SECTION: Final = "airborne"
 NO_FAS: Final = -1
 MAX_RPDS: Final = 48
 _MAX_STATION_ID: Final = 4
@@ -181,7 +181,7 @@ class AirborneParams:
         ParameterError
             Naming the source, what is unknown, or the value and its bound.
         """
-        return from_mapping(cls, mapping, source=source, section=ROOT_KEY)
+        return from_mapping(cls, mapping, source=source, section=SECTION)
 
     @classmethod
     def from_yaml(cls, path: str | Path) -> AirborneParams:
@@ -205,9 +205,9 @@ def airborne_section(path: str | Path) -> dict[str, Any]:
     """
     configuration = read_configuration(path)
     sections = configuration.sections()
-    if ROOT_KEY in sections:
-        return configuration.section(ROOT_KEY)
-    return {} if configuration.origin(ROOT_KEY) else sections
+    if SECTION in sections:
+        return configuration.section(SECTION)
+    return {} if configuration.origin(SECTION) else sections
 
 
 def _distinct(value: str, letters: str) -> bool:

@@ -138,8 +138,12 @@ class Parameter:
         """Bounds and unit in words."""
         unit = "" if self.unit == "-" else f" {self.unit}"
         if self.high is None:
-            return f"{self.low:g}{unit} or more"
-        return f"within {self.low:g} to {self.high:g}{unit}" if self.low is not None else f"{self.high:g}{unit} or less"
+            return f"{self.low:.8g}{unit} or more"
+        return (
+            f"within {self.low:.8g} to {self.high:.8g}{unit}"
+            if self.low is not None
+            else f"{self.high:.8g}{unit} or less"
+        )
 
 
 @dataclasses.dataclass(frozen=True)

@@ -146,6 +146,8 @@ class GbasNode(Node):
     def show_parameters(self, params: Any, prefix: str = "") -> None:
         """Show a set of parameters to ROS, read-only: values given from outside have been taken already."""
         for each in declared(params, prefix):
+            if each.value is None:  # left out
+                continue
             self.declare_read_only(each.key, each.value, descriptor_of(each))
 
     def declare_read_only(self, name: str, value: Any, about: str | ParameterDescriptor) -> None:

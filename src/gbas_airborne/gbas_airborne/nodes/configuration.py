@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from gbas_airborne.params import ROOT_KEY, AirborneParams, airborne_section
+from gbas_airborne.params import SECTION, AirborneParams, airborne_section
 from gbas_core.parameters import merged, nested
 from gbas_node.node import GbasNode
 
-PREFIX = f"{ROOT_KEY}."
+PREFIX = f"{SECTION}."
 
 
 def receiver_params(node: GbasNode, config: str) -> AirborneParams:
