@@ -417,8 +417,8 @@ def _bounded(schema: dict[str, Any], low: float | None, high: float | None) -> d
 
 
 def _explained(kind: type[Any], error: ValidationError, section: str = "") -> ParameterError:
-    """The first thing that is wrong, in the words of a file."""
-    found = error.errors(include_url=False)[0]
+    """The first thing that is wrong, in the words of a file; what is missing comes after what is there and wrong."""
+    found = min(error.errors(include_url=False), key=_is_missing)
     path = tuple(str(each) for each in found["loc"] if isinstance(each, str))
     key = ".".join((*([section] if section else []), *(file_key(each) for each in path)))
     reason, value = found["type"], found["input"]
@@ -438,6 +438,10 @@ def _explained(kind: type[Any], error: ValidationError, section: str = "") -> Pa
     if reason == "literal_error":
         return ParameterError(f"{key} = {value!r} is not one of {found['ctx']['expected'].replace(' or ', ', ')}")
     return ParameterError(f"{key} = {value!r} {_KINDS.get(reason, found['msg'])}")
+
+
+def _is_missing(problem: Mapping[str, Any]) -> bool:
+    return problem["type"] in _MISSING and not isinstance(problem["loc"][-1], int)
 
 
 def _nearest(name: str, known: list[str]) -> str:
