@@ -6,9 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from gbas_core.parameters import ParameterError
-from gbas_core.satellites import N_SATS, SAT_INDEX
 from gbas_ground.monitor_params import (
     AccelerationSection,
     CcdSection,
@@ -16,6 +13,9 @@ from gbas_ground.monitor_params import (
     MonitorParams,
     SigmaSection,
 )
+
+from gbas_core.parameters import ParameterError
+from gbas_core.satellites import N_SATS, SAT_INDEX
 from gbas_msgs_py.codes import ExclusionCause
 from gbas_msgs_py.records import GROUND_MONITORS, ChannelState, MonitorState
 from gbas_msgs_py.tables import MONITORS

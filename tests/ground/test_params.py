@@ -9,9 +9,9 @@ import math
 import numpy as np
 import pytest
 import yaml
+from gbas_ground.declared import Declared, all_specs, own_specs
 
 from gbas_core.gnss.frames import geodetic_from_ecef
-from gbas_ground.declared import Declared, all_specs, own_specs
 from gbas_ground.params import GCID_UNHEALTHY, GroundParams, ParameterError
 from gbas_vdb.messages.types import Type2
 from ground_runs import params

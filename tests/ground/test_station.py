@@ -6,13 +6,13 @@ import dataclasses
 
 import numpy as np
 import pytest
+from gbas_ground.monitor_params import ExpectedPowerSection, MonitorParams, PowerSection
 
 from gbas_core.gnss.ephemeris import Ephemeris
 from gbas_core.gnss.gpstime import SECONDS_PER_WEEK, add_seconds
 from gbas_core.gnss.observations import ObservationEpoch
 from gbas_core.satellites import IS_GALILEO, IS_GPS, N_SATS, SAT_INDEX
 from gbas_core.signals import L1, SPEED_OF_LIGHT_MPS
-from gbas_ground.monitor_params import ExpectedPowerSection, MonitorParams, PowerSection
 from gbas_ground.station import RESTART_AFTER_REFUSED, GroundEpoch, GroundStation
 from gbas_msgs_py.codes import ExclusionCause
 from gbas_msgs_py.records import GROUND_MONITORS, ChannelState, MonitorState

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from gbas_ground.monitor_params import MonitorParams
 
 from gbas_core.gnss.ephemeris import Ephemeris
 from gbas_core.gnss.frames import azimuth_elevation, geodetic_from_ecef, rot_enu_ecef
@@ -20,7 +21,6 @@ from gbas_core.signals import L1, SPEED_OF_LIGHT_MPS
 from gbas_ground.channels import ephemerides
 from gbas_ground.channels.predicted_ranges import predict_ranges, site_of
 from gbas_ground.channels.tracking import TrackGroup, initial_tracking, stack, track
-from gbas_ground.monitor_params import MonitorParams
 from gbas_ground.monitors.ionosphere_gradient import IonosphereGradientParams
 from gbas_ground.params import GroundParams
 from gbas_msgs_py.joining import ReceptionQueue

@@ -91,8 +91,8 @@ def _in_files(schema: dict[str, Any], name: str, definitions: dict[str, Any]) ->
     return _open({**schema, "title": name}, name)
 
 
-def _open(schema: dict[str, Any], name: str) -> dict[str, Any]:
-    """The same with every value allowed to be null, none required, numbers finite, references within `name`."""
+def _open(schema: dict[str, Any], name: str, *, in_list: bool = False) -> dict[str, Any]:
+    """The same with every value of a key allowed to be null, none required, numbers finite, references to `name`."""
     if "$ref" in schema:
         reference = schema["$ref"].removeprefix("#/$defs/")
         return {**schema, "$ref": f"#/$defs/{name}.{reference}"}
@@ -103,11 +103,13 @@ def _open(schema: dict[str, Any], name: str) -> dict[str, Any]:
             found[key] = {each: _open(inner, name) for each, inner in found[key].items()}
     for key in ("items", "additionalProperties"):
         if isinstance(found.get(key), dict):
-            found[key] = _open(found[key], name)
+            found[key] = _open(found[key], name, in_list=key == "items")
     for key in ("prefixItems", "anyOf", "oneOf", "allOf"):
         if key in found:
-            found[key] = [_open(each, name) for each in found[key]]
-    return _nullable(found)
+            found[key] = [_open(each, name, in_list=in_list or key == "prefixItems") for each in found[key]]
+    if found.get("type") == "number":
+        found |= _FINITE
+    return found if in_list else _nullable(found)
 
 
 def _without_null_choice(schema: dict[str, Any]) -> dict[str, Any]:
@@ -127,8 +129,6 @@ def _nullable(schema: dict[str, Any]) -> dict[str, Any]:
     if "enum" in schema:
         schema["enum"] = [*schema["enum"], None]
     kind = schema.get("type")
-    if kind in ("number", "integer"):
-        schema |= _FINITE
     if isinstance(kind, str) and kind != "null":
         schema["type"] = [kind, "null"]
     return schema

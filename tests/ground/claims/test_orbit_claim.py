@@ -7,6 +7,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from gbas_ground.monitor_params import EphemerisSection, MonitorParams
 
 from gbas_core.parameters import ParameterError
 from gbas_ground.claims.orbit_claim import (
@@ -16,7 +17,6 @@ from gbas_ground.claims.orbit_claim import (
     orbit_bound,
     supported_decorrelation,
 )
-from gbas_ground.monitor_params import EphemerisSection, MonitorParams
 from gbas_ground.monitors.double_difference import DoubleDifferences
 from gbas_ground.monitors.ephemeris_residual import assumed_sigma_m
 from gbas_msgs_py.codes import ExclusionCause
