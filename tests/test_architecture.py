@@ -48,6 +48,7 @@ ROOMS = {
         "bounds",
         "errors",
         "parameters",
+        "configuration",
         "compiled",
         "gnss",
         "ranging",

@@ -142,7 +142,7 @@ NAN, INFINITY = float("nan"), float("inf")
         ("ground", "station.max_use_distance_m", NAN, "station.max_use_distance_m = nan is not a finite number"),
         ("ground", "station.max_use_distance_m", INFINITY, "station.max_use_distance_m = inf is not a finite number"),
         ("ground", "station.max_use_distance_m", -1.0, "station.max_use_distance_m = -1.0 is not within 0 to 510000 m"),
-        ("ground", "receivers.rr1_ecef_m", [1.0, 2.0], "receivers.rr1_ecef_m = [1.0, 2.0] has not the right number"),
+        ("ground", "receivers.rr1_ecef_m", [1.0, 2.0], "receivers.rr1_ecef_m = (1.0, 2.0) has not the right number"),
         ("ground", "receivers.rr1_ecef_m", [1.0, None, 2.0], "receivers.rr1_ecef_m = None is not a number"),
         ("ground", "receivers.rr2_ecef_m", 3.0, "receivers.rr2_ecef_m = 3.0 is not a list"),
         ("ground", "receivers.rr5_ecef_m", [1.0, 2.0, 3.0], "receivers.rr5_ecef_m is unknown; did you mean 'rr"),
@@ -167,7 +167,7 @@ NAN, INFINITY = float("nan"), float("inf")
         ("airborne", "inflate_unsettled", 1, "airborne.inflate_unsettled = 1 is not true or false"),
         ("airborne", "systems", "GR", "airborne.systems = 'GR' is not one of 'G', 'E', 'GE', 'EG'"),
         ("airborne", "max_iterations", 1, "airborne.max_iterations = 1 is not within 2 to 100"),
-        ("airborne", "settle_s", [1.0], "airborne.settle_s = [1.0] is not a number"),
+        ("airborne", "settle_s", [1.0], "airborne.settle_s = (1.0,) is not a number"),
     ],
 )  # fmt: skip
 def test_the_schema_refuses_what_the_command_refuses(

@@ -63,7 +63,7 @@ def station(**mapping: Any) -> Station:
         ({"points": 7}, "points = 7 is odd"),
         ({"exclude": 1}, "exclude = 1 is not true or false"),
         ({"form": "x"}, "form = 'x' is not one of 'full_rank', 'published'"),
-        ({"natural": (0.1,)}, "natural = [0.1] has not the right number of values"),
+        ({"natural": (0.1,)}, "natural = (0.1,) has not the right number of values"),
         ({"natural": (0.1, 3.0)}, "natural = 3.0 is not within 0 to 1 m"),
         ({"limit_m": 10.0}, "limit_m = 10.0 is not within 0 to 9 m"),
         ({"tau": 3.0}, "tau is unknown; did you mean 'tau_s'?"),

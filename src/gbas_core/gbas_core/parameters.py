@@ -421,7 +421,7 @@ def _explained(kind: type[Any], error: ValidationError, section: str = "") -> Pa
     found = min(error.errors(include_url=False), key=_is_missing)
     path = tuple(str(each) for each in found["loc"] if isinstance(each, str))
     key = ".".join((*([section] if section else []), *(file_key(each) for each in path)))
-    reason, value = found["type"], _listed(found["input"])
+    reason, value = found["type"], found["input"]
     if reason in ("too_long", "too_short") or (reason in _MISSING and isinstance(found["loc"][-1], int)):
         return ParameterError(f"{key} = {value!r} has not the right number of values")
     if reason in _UNKNOWN:
@@ -438,11 +438,6 @@ def _explained(kind: type[Any], error: ValidationError, section: str = "") -> Pa
     if reason == "literal_error":
         return ParameterError(f"{key} = {value!r} is not one of {found['ctx']['expected'].replace(' or ', ', ')}")
     return ParameterError(f"{key} = {value!r} {_KINDS.get(reason, found['msg'])}")
-
-
-def _listed(value: Any) -> Any:
-    """Lists as lists, as a file has them."""
-    return [_listed(each) for each in value] if isinstance(value, tuple | list) else value
 
 
 def _is_missing(problem: Mapping[str, Any]) -> bool:
