@@ -252,6 +252,16 @@ def test_values_say_where_they_came_from() -> None:
     assert found.nodes[0] == "simulator"
 
 
+@pytest.mark.parametrize("path", configurations(), ids=lambda path: path.stem)
+def test_shipped_files_are_read_as_a_run_reads_them(path: Path) -> None:
+    found = effective(path)
+    if path.stem == "nominal_station":  # the site is the recording's
+        assert (found.nodes, found.lacking) == ((), ("ground: station.latitude_deg is missing (reference point)",))
+    else:
+        assert (found.nodes[0], found.lacking) == ("simulator", ())
+    assert not any(each.source == str(path) and each.declared.value is None for each in found.values["ground"])
+
+
 def test_files_named_by_nodes_are_read_and_nodes_may_differ(tmp_path: Path) -> None:
     (tmp_path / "fleet.yaml").write_text("airborne: {aad: B, settle_s: 100, elevation_mask_deg: 7}\n")
     named = {"config": str(tmp_path / "fleet.yaml")}

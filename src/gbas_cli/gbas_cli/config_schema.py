@@ -96,6 +96,8 @@ def _open(schema: dict[str, Any], name: str, *, in_list: bool = False) -> dict[s
     if "$ref" in schema:
         reference = schema["$ref"].removeprefix("#/$defs/")
         return {**schema, "$ref": f"#/$defs/{name}.{reference}"}
+    if "discriminator" in schema:
+        return _by_kind(schema, name)
     found = {key: value for key, value in schema.items() if key != "required"}
     found |= _without_null_choice(found)
     for key in ("properties", "patternProperties"):
@@ -110,6 +112,23 @@ def _open(schema: dict[str, Any], name: str, *, in_list: bool = False) -> dict[s
     if found.get("type") == "number":
         found |= _FINITE
     return found if in_list else _nullable(found)
+
+
+def _by_kind(schema: dict[str, Any], name: str) -> dict[str, Any]:
+    """A section of one of several kinds: which one is told by a key, and what is wrong by that kind alone."""
+    key, kinds = schema["discriminator"]["propertyName"], schema["discriminator"]["mapping"]
+    rest = {each: value for each, value in schema.items() if each not in ("discriminator", "oneOf", "default")}
+    return rest | {
+        "type": ["object", "null"],
+        "properties": {key: {"enum": list(kinds)}},
+        "allOf": [
+            {
+                "if": {"properties": {key: {"const": kind}}, "required": [key]},
+                "then": _open({"$ref": reference}, name),
+            }
+            for kind, reference in kinds.items()
+        ],
+    }
 
 
 def _without_null_choice(schema: dict[str, Any]) -> dict[str, Any]:

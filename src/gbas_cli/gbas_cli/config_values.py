@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import MISSING, dataclass, replace
 from functools import reduce
 from pathlib import Path
 from typing import Any, Final
@@ -108,7 +108,7 @@ def _sections_only(configuration: Configuration) -> Effective:
             if " is missing" not in str(error):
                 raise
             lacking.append(f"{name}: {str(error).removeprefix(f'{path}: ')}")
-            shown = _given_only(section, _mapping(sections, name, path))
+            shown = _as_far_as_given(section, _mapping(sections, name, path))
         else:
             shown = section.shown(params, sections)
         values[name] = tuple(
@@ -117,9 +117,13 @@ def _sections_only(configuration: Configuration) -> Effective:
     return Effective(path=path, files=configuration.files, nodes=(), values=values, lacking=tuple(lacking))
 
 
-def _given_only(section: Section, given: Mapping[str, Any]) -> list[Declared]:
-    """Of a section that is not whole, what is there."""
-    return [replace(each, value=_at(given, each.key)) for each in declared(section.models[0]) if _has(given, each.key)]
+def _as_far_as_given(section: Section, given: Mapping[str, Any]) -> Iterator[Declared]:
+    """Values of a section that is not whole."""
+    for each in declared(section.models[0]):
+        if _has(given, each.key):
+            yield replace(each, value=_at(given, each.key))
+        elif each.value is not MISSING:
+            yield each
 
 
 def _mapping(sections: Mapping[str, Any], name: str, path: Path) -> Mapping[str, Any]:
