@@ -6,7 +6,7 @@ reach a position.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -19,9 +19,9 @@ from gbas_chain.process import NOMINAL_STATION, ProcessRequest, prepare
 from gbas_chain.results import Row
 from gbas_core.gnss.gpstime import epoch_key
 from gbas_core.satellites import SAT_INDEX
+from gbas_ground.params import watching
 from gbas_msgs_py.codes import ExclusionCause
 from gbas_msgs_py.records import ChannelState
-from ground_runs import watching_monitors
 
 FOLDER = "static_pair_L1L2_1h_2010"
 RIGHT, WRONG = "brdc0770.10n.gz", "brdc0770.10nERR.gz"
@@ -114,7 +114,7 @@ def test_ground_that_never_knew_better_does_not_correct_with_it(data_dir: Path) 
     )
     received = prepared.recording.ephemerides()
     newest = tuple(item for item in received if not item.toe_tow_s[G17] < LAST_S - 3600)
-    ground = replace(prepared.ground, monitors=watching_monitors())  # a file of 30 s is too slow for them
+    ground = watching(prepared.ground)  # a file of 30 s is too slow for them
     chain = Chain(ground, prepared.airborne, newest, newest)
     first, last = epoch_key(WEEK, 345_600 + 20.1 * 3600), epoch_key(WEEK, LAST_S)
     outputs = [chain.ground_step(epoch) for epoch in prepared.recording.epochs(first=first, last=last)]

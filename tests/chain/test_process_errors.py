@@ -84,7 +84,10 @@ def test_wrong_antenna_position_gives_no_position(data_dir: Path) -> None:
     [
         ("ground: [1, 2", "is not YAML"),
         ("ground:\n  station: {id: TOOLONG, gcid: 1}\n", "station.id = 'TOOLONG'"),
-        ("ground:\n  station: {id: TEST, gcid: 1, colour: red}\n", "parameter 'station.colour' is unknown"),
+        (
+            "ground:\n  station: {id: TEST, gcid: 1, colour: red}\n",
+            "station.colour is unknown; known are gcid, height_m",
+        ),
         ("airborne: {}\n", "has no section 'ground'"),
     ],
 )

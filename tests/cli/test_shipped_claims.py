@@ -8,9 +8,9 @@ import pytest
 
 from claims_table import row, shipped_files, shipped_stations, table
 from gbas_ground.claims.broadcast_claims import orbit_claim, supported_gcid
-from gbas_ground.claims.gradient_claim import MAX_M_EIG, MAX_Y_EIG_M
-from gbas_ground.claims.orbit_claim import MAX_DECORRELATION
-from gbas_ground.params import GCID_UNHEALTHY, MAX_SIGMA_VIG, GroundParams
+from gbas_ground.claims.limits import MAX_DECORRELATION, MAX_M_EIG, MAX_Y_EIG_M
+from gbas_ground.params import GroundParams
+from gbas_ground.sections import GCID_UNHEALTHY, MAX_SIGMA_VIG
 
 DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "validation.md"
 NOMINAL_SIGMA_VIG = 4.0e-6

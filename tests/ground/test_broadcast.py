@@ -11,7 +11,7 @@ from gbas_core.gnss.gpstime import modified_z_count_s
 from gbas_core.positioning.approach import FinalApproach
 from gbas_core.satellites import IS_GPS, RANGING_SOURCE_ID, SOURCE_ID_INDEX
 from gbas_ground.broadcast import BroadcastState, broadcast_frame, empty_integrity
-from gbas_ground.params import GCID_UNHEALTHY
+from gbas_ground.sections import GCID_UNHEALTHY
 from gbas_ground.station import GroundStation
 from gbas_msgs_py.records import ChannelState
 from gbas_vdb.messages.types import Type1, Type2, Type4, Type11
@@ -47,7 +47,7 @@ def noisy(receivers=4, **changes):
 
 @pytest.fixture(scope="module")
 def full():
-    return noisy(gast_d=True, slots="ABC")
+    return noisy(gast_d__enabled=True, vdb__slots="ABC")
 
 
 def test_corrections_arrive_within_half_of_the_last_bit(full):
@@ -136,7 +136,7 @@ def test_gcid_changes_in_the_next_frame():
 
 
 def test_default_gcid_is_unhealthy():
-    _, out = noisy(3, gcid=GCID_UNHEALTHY)
+    _, out = noisy(3, station__gcid=GCID_UNHEALTHY)
     assert {message.gcid for bursts in out.bursts for message in messages(bursts, Type2)} == {GCID_UNHEALTHY}
 
 
@@ -205,7 +205,7 @@ def test_frame_without_integrity_is_a_live_but_empty_station():
 
 
 def test_more_satellites_than_fit_leave_out_the_lowest():
-    _station, out = noisy(2, slots="A")
+    _station, out = noisy(2, vdb__slots="A")
     integrity = out.integrity[-1]
     usable = np.flatnonzero(integrity.state == ChannelState.USABLE)
     sent = messages(out.bursts[-1], Type1)[0].measurements
@@ -217,7 +217,7 @@ def test_more_satellites_than_fit_leave_out_the_lowest():
 
 def test_galileo_is_numbered_apart():
     """The standard numbers no Galileo satellites; the suite uses 70 + SVID."""
-    _, out = noisy(2, systems="GE")
+    _, out = noisy(2, station__systems="GE")
     sent = [each.ranging_source_id for message in messages(out.bursts[-1], Type1) for each in message.measurements]
     assert {number <= 36 for number in sent} == {True, False}
     assert all((number > 70) == (not IS_GPS[SOURCE_ID_INDEX[number]]) for number in sent)

@@ -78,7 +78,12 @@ def check(integrity, station):
 def test_invariants_under_random_damage(ranges, seed, receivers, rate, settle_s):
     rng = np.random.default_rng(seed)
     station = params(
-        receivers, smoothing__settle_time_s=settle_s, monitors__readmission_time_s=2.0, smoothing__tau_s=(5.0, 2.0), gast_d__enabled=True, vdb__slots="ABC"
+        receivers,
+        smoothing__settle_time_s=settle_s,
+        monitors__readmission_time_s=2.0,
+        smoothing__tau_s=(5.0, 2.0),
+        gast_d__enabled=True,
+        vdb__slots="ABC",
     )
     state = initial_state(station)
     ephemeris = WORLDS[receivers].ephemeris

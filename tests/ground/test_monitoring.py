@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from gbas_ground.monitor_params import (
-    AccelerationSection,
-    CcdSection,
-    GradientSection,
-    MonitorParams,
-    SigmaSection,
-)
 
 from gbas_core.parameters import ParameterError
 from gbas_core.satellites import N_SATS, SAT_INDEX
+from gbas_ground.monitors.carrier_acceleration import CarrierAccelerationParams
+from gbas_ground.monitors.sigma_monitor import SigmaMonitorParams
+from gbas_ground.params import watching
 from gbas_msgs_py.codes import ExclusionCause
 from gbas_msgs_py.records import GROUND_MONITORS, ChannelState, MonitorState
 from gbas_msgs_py.tables import MONITORS
-from ground_runs import half_seconds, params, run, watching_monitors
+from ground_runs import half_seconds, params, run
 from synthetic_ranges import TOW_S, truth
 
 G02 = SAT_INDEX["G02"]
@@ -109,7 +103,7 @@ def test_carriers_that_differ_over_a_baseline():
 
 def test_a_monitor_that_only_watches_fails_and_excludes_nothing():
     drift = on_g02(lambda since: 0.1 * since)
-    station = params(4, monitors=replace(MonitorParams(), ccd=CcdSection(exclude=False)))
+    station = params(4, ccd__exclude=False)
     out = run(truth(4), station, half_seconds(100), code_error_m=drift, carrier_error_m=lambda _: 0.0)
     assert states_of(out, "ccd")[-1, G02] == MonitorState.FAILED
     assert out.integrity[-1].state[G02] == ChannelState.USABLE
@@ -117,7 +111,7 @@ def test_a_monitor_that_only_watches_fails_and_excludes_nothing():
 
 
 def test_a_satellite_that_cannot_be_judged_yet_is_not_used():
-    out = run(truth(4), params(4, monitors=MonitorParams(ccd=CcdSection(settle_s=12.0))), half_seconds(40))
+    out = run(truth(4), params(4, ccd__settle_s=12.0), half_seconds(40))
     cause, state = out.array("cause")[:, G02], out.array("state")[:, G02]
     seconds = np.array(out.seconds)
     between = (seconds >= 5.0) & (seconds < 12.0)
@@ -133,19 +127,18 @@ def test_data_too_slow_for_a_required_monitor_are_never_used():
     out = run(truth(4), station, 4.0 * np.arange(20))
     assert (out.array("state")[:, G02] != ChannelState.USABLE).all()
     assert out.integrity[-1].cause[G02] == ExclusionCause.UNMONITORED
-    assert (
-        run(truth(4), replace(station, monitors=watching_monitors()), 4.0 * np.arange(20)).integrity[-1].state[G02]
-        == ChannelState.USABLE
-    )
+    assert run(truth(4), watching(station), 4.0 * np.arange(20)).integrity[-1].state[G02] == ChannelState.USABLE
 
 
 def test_service_type_d_needs_the_gradient_monitor():
     """A single receiver has no baseline."""
-    one = {"gast_d": True, "slots": "ABC", "min_receivers": 1}
+    one = {"gast_d__enabled": True, "vdb__slots": "ABC", "receivers__minimum": 1}
     out = run(truth(1), params(1, **one), half_seconds(30))
     assert (out.array("state")[:, G02] != ChannelState.USABLE).all()
     assert out.integrity[-1].cause[G02] == ExclusionCause.UNMONITORED
-    assert run(truth(1), params(1, receivers__minimum=1), half_seconds(30)).integrity[-1].state[G02] == ChannelState.USABLE
+    assert (
+        run(truth(1), params(1, receivers__minimum=1), half_seconds(30)).integrity[-1].state[G02] == ChannelState.USABLE
+    )
 
 
 def test_a_quiet_station_passes_everything_and_every_table_can_be_sent():
@@ -163,8 +156,8 @@ def test_a_quiet_station_passes_everything_and_every_table_can_be_sent():
 
 def test_the_budget_of_false_exclusions_is_kept():
     with pytest.raises(ParameterError, match="together more than the budget of 2e-07"):
-        MonitorParams(gradient=GradientSection(p_false_alarm=3e-7))
-    with pytest.raises(ParameterError, match=r"acceleration.least_points = 20 is more than acceleration.points = 10"):
-        AccelerationSection(least_points=20)
-    with pytest.raises(ParameterError, match=r"sigma_monitor.sample_s = 700 is not within"):
-        SigmaSection(sample_s=700.0)
+        params(4, ionosphere_gradient__p_false_alarm=3e-7)
+    with pytest.raises(ParameterError, match=r"least_points = 20 is more than points = 10"):
+        CarrierAccelerationParams(least_points=20)
+    with pytest.raises(ParameterError, match=r"sample_s = 700 is not within"):
+        SigmaMonitorParams(sample_s=700.0)

@@ -13,6 +13,7 @@ import pytest
 from gbas_bringup.resources import named_config
 from gbas_core.gnss.frames import rot_enu_ecef
 from gbas_core.gnss.gpstime import from_epoch_key
+from gbas_core.parameters import replaced
 from gbas_core.satellites import N_SATS, SAT_INDEX
 from gbas_core.signals import SPEED_OF_LIGHT_MPS, WAVELENGTH_M
 from gbas_ground.params import GroundParams
@@ -20,7 +21,7 @@ from gbas_ground.station import GroundEpoch, GroundStation, initial_monitor_stat
 from gbas_msgs_py.records import ChannelState
 from gbas_sim.scenario import read_sections, scenario_from_yaml
 from gbas_sim.world import World
-from ground_runs import half_seconds, params, run
+from ground_runs import half_seconds, params, receiver_values, run
 from synthetic_ranges import TOW_S, truth
 
 SETTLE_S = 20.0
@@ -39,7 +40,10 @@ def world():
 @pytest.fixture(scope="module")
 def station():
     sections = read_sections(named_config("quiet_approach"))["ground"]
-    return replace(GroundParams.from_mapping(sections), settle_time_s=SETTLE_S, readmission_time_s=10.0)
+    return replaced(
+        GroundParams.from_mapping(sections),
+        {"smoothing.settle_time_s": SETTLE_S, "monitors.readmission_time_s": 10.0},
+    )
 
 
 def changed(receiver, **quantities):
@@ -76,7 +80,7 @@ def moved(station, receiver, enu_m):
     position = position + enu_m @ rot_enu_ecef(station.station.latitude_rad, station.station.longitude_rad)
     places = list(station.receivers.ecef_m)
     places[receiver] = tuple(float(each) for each in position)
-    return replace(station, receiver_ecef_m=tuple(places))
+    return replaced(station, receiver_values(np.array(places)))
 
 
 def test_codes_off_by_a_millisecond_name_the_receiver(world, station):
@@ -143,7 +147,8 @@ def test_two_receivers_in_each_others_place_are_named(world, station):
 @pytest.mark.parametrize("count", [2, 3])
 def test_two_or_three_receivers_do_not_tell_which_is_wrong(world, station, count):
     """Then it is the satellites: whatever the receivers have, none is used that does not fit."""
-    fewer = moved(replace(station, receiver_ecef_m=station.receivers.ecef_m[:count]), 1, np.array([0.12, 0.0, 0.0]))
+    without = {f"receivers.rr{row}_ecef_m": None for row in range(count + 1, 5)}
+    fewer = moved(replaced(station, without), 1, np.array([0.12, 0.0, 0.0]))
     usable, _, told = watched(world, fewer, lambda seen: seen[:count])
     assert not [subject for _, subject, _ in told if subject.startswith("rr")]
     assert {cause for _, _, cause in told} <= {"ionosphere_gradient", "ephemeris_residual", "too_few_common_satellites"}

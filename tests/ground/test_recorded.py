@@ -11,12 +11,13 @@ import yaml
 from gbas_core.gnss.frames import geodetic_from_ecef
 from gbas_core.gnss.gpstime import epoch_key, from_epoch_key
 from gbas_core.io.recording import Recording
+from gbas_core.parameters import made_of
 from gbas_core.satellites import SAT_INDEX
-from gbas_ground.params import GroundParams
+from gbas_ground.params import GroundParams, watching
 from gbas_ground.station import GroundEpoch, GroundStation, initial_state
 from gbas_msgs_py.joining import ReceptionQueue
 from gbas_msgs_py.records import ChannelState
-from ground_runs import watching_monitors
+from ground_runs import receiver_values
 
 SETS = yaml.safe_load((Path(__file__).parents[1] / "tables" / "recorded_sets.yaml").read_text())
 GARR_M = (4796983.5094, 160309.1219, 4187340.3440)
@@ -120,7 +121,7 @@ def test_faulty_ephemeris_of_g17_never_comes_into_use(data_dir, faulty):
     midnight = int(recording.keys[0])
     integrity, events = run(
         recording,
-        station_at((GARR_M,), smoothing__max_gap_s=45.0, monitors=watching_monitors()),  # a file of 30 s: too slow for them
+        watching(station_at((GARR_M,), smoothing__max_gap_s=45.0)),  # a file of 30 s: too slow for them
         first=midnight + 17 * 3_600_000,
         last=midnight + 20 * 3_600_000,
     )

@@ -6,17 +6,17 @@ import dataclasses
 
 import numpy as np
 import pytest
-from gbas_ground.monitor_params import ExpectedPowerSection, MonitorParams, PowerSection
 
 from gbas_core.gnss.ephemeris import Ephemeris
 from gbas_core.gnss.gpstime import SECONDS_PER_WEEK, add_seconds
 from gbas_core.gnss.observations import ObservationEpoch
 from gbas_core.satellites import IS_GALILEO, IS_GPS, N_SATS, SAT_INDEX
 from gbas_core.signals import L1, SPEED_OF_LIGHT_MPS
+from gbas_ground.params import watching
 from gbas_ground.station import RESTART_AFTER_REFUSED, GroundEpoch, GroundStation
 from gbas_msgs_py.codes import ExclusionCause
 from gbas_msgs_py.records import GROUND_MONITORS, ChannelState, MonitorState
-from ground_runs import half_seconds, params, run, watching_monitors
+from ground_runs import half_seconds, params, run
 from synthetic_ranges import TOW_S, WEEK, constellation, truth
 
 MS_M = 1e-3 * SPEED_OF_LIGHT_MPS
@@ -187,7 +187,9 @@ def test_receiver_with_several_faults_is_excluded_whole():
             result[3, faulty] = [9.0, -9.0, 8.0, -9.5]
         return result
 
-    station = params(4, smoothing__tau_s=(2.0, 2.0), monitors__receiver_fault_channels=3, monitors__readmission_time_s=10.0)
+    station = params(
+        4, smoothing__tau_s=(2.0, 2.0), monitors__receiver_fault_channels=3, monitors__readmission_time_s=10.0
+    )
     out = run(truth(4), station, half_seconds(120), code_error_m=error, carrier_error_m=lambda _: 0.0)
     told = out.told("receiver_fault")
     assert [event[1:] for event in told] == [("exclusion", "rr4"), ("readmission", "rr4")]
@@ -213,7 +215,12 @@ def test_exclusions_that_leave_no_clock_still_end():
 
     in_view = np.flatnonzero(np.isfinite(truth(2).range_m(WEEK, TOW_S)).all(axis=0) & IS_GPS)
     station = params(
-        2, station__systems="G", smoothing__tau_s=(2.0, 2.0), monitors__readmission_time_s=10.0, accuracy__designator="C", monitors__min_common_satellites=5
+        2,
+        station__systems="G",
+        smoothing__tau_s=(2.0, 2.0),
+        monitors__readmission_time_s=10.0,
+        accuracy__designator="C",
+        monitors__min_common_satellites=5,
     )
     out = run(truth(2), station, half_seconds(120), code_error_m=error, carrier_error_m=lambda _: 0.0)
     count = (out.array("state") == ChannelState.USABLE).sum(axis=1)
@@ -239,7 +246,7 @@ def test_correction_limit(sign):
 def test_rate_limit():
     error = lambda second: np.where(np.arange(N_SATS) == SAT_INDEX["G02"], 5.0 * second, 0.0)  # noqa: E731
     # 5 m/s would be taken for a slip against the known range; here it is a rate both code and carrier have
-    station = params(3, smoothing__settle_time_s=0.0, monitors=watching_monitors())
+    station = watching(params(3, smoothing__settle_time_s=0.0))
     out = run(truth(3), station, half_seconds(20), code_error_m=error)
     told = out.told("rrc_limit")
     assert told[0][1:] == ("exclusion", "G02")
@@ -280,14 +287,14 @@ def test_one_name_is_one_monitor():
         return observed
 
     def told(**sections):
-        station = params(4, monitors=dataclasses.replace(MonitorParams(), **sections))
+        station = params(4, **sections)
         out = run(truth(4), station, half_seconds(40), change=weak)
         rows = [GROUND_MONITORS.index(name) for name in ("power", "expected_power")]
         assert (out.statistics[-1].state[rows, SAT_INDEX["G05"]] == MonitorState.FAILED).any()
         causes = {cause for cause in ("signal_power", "expected_power") if out.told(cause)}
         return causes, out.integrity[-1].receiver_used[2, SAT_INDEX["G05"]] == 1.0
 
-    power, expected = {"power": PowerSection(exclude=False)}, {"expected_power": ExpectedPowerSection(exclude=False)}
+    power, expected = {"signal_power__exclude": False}, {"expected_power__exclude": False}
     assert told() == ({"signal_power"}, False)  # the averaged one is slower, and does not look at what is out
     assert told(**power) == ({"expected_power"}, False)
     assert told(**expected) == ({"signal_power"}, False)
@@ -399,7 +406,9 @@ def test_receiver_missing_for_an_epoch_keeps_its_filters():
         return (observed[0], None, observed[2]) if second in (10.0, 12.0, 12.5) else observed
 
     error = np.random.default_rng(0).normal(0.0, 5.0, N_SATS)
-    out = run(truth(3), params(3, smoothing__settle_time_s=5.0), half_seconds(40), change=drop, code_error_m=lambda _: error)
+    out = run(
+        truth(3), params(3, smoothing__settle_time_s=5.0), half_seconds(40), change=drop, code_error_m=lambda _: error
+    )
     seconds, receivers = np.array(out.seconds), out.array("n_receivers")
     away = np.isin(seconds, [10.0, 12.0, 12.5])
     assert (receivers[away] == 2.0).all()
@@ -416,7 +425,9 @@ def test_receiver_missing_too_long_starts_anew():
     def drop(second, observed):
         return (observed[0], None, observed[2]) if 10.0 <= second < 14.0 else observed
 
-    out = run(truth(3), params(3, smoothing__settle_time_s=5.0, smoothing__max_gap_s=3.5), half_seconds(60), change=drop)
+    out = run(
+        truth(3), params(3, smoothing__settle_time_s=5.0, smoothing__max_gap_s=3.5), half_seconds(60), change=drop
+    )
     seconds, receivers = np.array(out.seconds), out.array("n_receivers")
     assert (receivers[(seconds >= 10.0) & (seconds < 19.0)] == 2.0).all()
     assert (receivers[seconds >= 19.0] == 3.0).all()

@@ -47,7 +47,7 @@ STATION: dict[str, Any] = {
         "minimum": 1,
     },
     "smoothing": {"settle_time_s": 20.0},
-    "monitors": {"require_cn0": False},
+    "signal_power": {"require_cn0": False},
     "vdb": {"slots": "AB"},
 }
 RECEIVER: dict[str, Any] = {"settle_s": 20.0, "max_speed_mps": 1.0}

@@ -35,7 +35,7 @@ STATION: dict[str, Any] = {
         "minimum": 1,
     },
     "smoothing": {"settle_time_s": 10.0},
-    "monitors": {"require_cn0": False},
+    "signal_power": {"require_cn0": False},
     "vdb": {"slots": "AB"},
     "ephemeris": {"k_md_e_c": 5.0},
     "atmosphere": {"sigma_vert_iono_gradient": 4e-6, "refractivity_uncertainty": 20.0},

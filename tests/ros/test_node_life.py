@@ -159,7 +159,7 @@ def test_parameters_are_visible_with_their_values_and_read_only(launcher: Any, p
         "join_timeout_s",
         "start_wait_s",
         "ground.station.id",
-        "ground.monitors.k_b",
+        "ground.b_value.k_b",
         "ground.receivers.rr2_ecef_m",
     ]
     request = GetParameters.Request(names=names)

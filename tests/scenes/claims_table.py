@@ -11,7 +11,8 @@ from gbas_bringup.resources import config_path
 from gbas_chain.process import NOMINAL_STATION
 from gbas_core.gnss.frames import geodetic_from_ecef
 from gbas_ground.claims.broadcast_claims import orbit_claim, supported_gcid
-from gbas_ground.params import MAX_SIGMA_VIG, GroundParams
+from gbas_ground.params import GroundParams
+from gbas_ground.sections import MAX_SIGMA_VIG
 from gbas_sim.scenario import read_sections
 from monitor_scenes import BRAUNSCHWEIG_M
 
@@ -57,7 +58,9 @@ def shipped_stations() -> Iterator[tuple[str, GroundParams]]:
 def row(name: str, station: GroundParams) -> str:
     """One line of the table."""
     claim, sigma = orbit_claim(station), station.atmosphere.sigma_vert_iono_gradient
-    gradients = f"{station.gast_d.y_eig_m:g} m, {1e3 * station.gast_d.m_eig:g} m/km" if station.gast_d.enabled else "no type D"
+    gradients = (
+        f"{station.gast_d.y_eig_m:g} m, {1e3 * station.gast_d.m_eig:g} m/km" if station.gast_d.enabled else "no type D"
+    )
     cells = (
         name,
         str(station.n_receivers),

@@ -25,6 +25,7 @@ from gbas_core.gnss.frames import geodetic_from_ecef, rot_enu_ecef
 from gbas_core.gnss.gpstime import epoch_key, from_epoch_key
 from gbas_core.gnss.observations import ObservationEpoch
 from gbas_core.io.recording import RecordedEpoch
+from gbas_core.parameters import replaced
 from gbas_core.record import FloatArray
 from gbas_core.satellites import N_SATS, SAT_IDS
 from gbas_core.signals import SPEED_OF_LIGHT_MPS, WAVELENGTH_M
@@ -204,6 +205,9 @@ def _key(row: Row) -> int:
     return epoch_key(row.gps_week, row.tow_s)
 
 
+_QUICK = {"smoothing.settle_time_s": SETTLE_S, "ephemeris.settle_s": 5.0, "monitors.readmission_time_s": 10.0}
+
+
 def _settled(chain: Chain, epochs: Epochs, truth: dict[int, FloatArray], course_rad: float, warm: int) -> Scene:
     """The scene after `warm` epochs without a fault; all of them must be behind the chain."""
     begin = Scene(chain=chain, epochs=epochs, truth=truth, course_rad=course_rad)
@@ -218,15 +222,12 @@ def recorded_scene(data: Path, name: str = "mosaic_base_rover", *, warm: int = 7
     true_m = truth_ecef_m(name, data, np.array([from_epoch_key(epoch.key)[1] for epoch in epochs]))
     chain = Chain(
         # healthy, so that there is a service to lose; the station file claims none for recorded data
-        replace(prepared.ground, gcid=1, settle_time_s=SETTLE_S, ephemeris_settle_s=5.0, readmission_time_s=10.0),
+        replaced(prepared.ground, {"station.gcid": 1, **_QUICK}),
         replace(prepared.airborne, settle_s=SETTLE_S, use_unhealthy=False),
         prepared.recording.ephemerides(),
         prepared.recording.user_ephemerides(),
     )
     return _settled(chain, epochs, {e.key: t for e, t in zip(epochs, true_m, strict=True)}, 0.0, warm)
-
-
-_QUICK = {"smoothing.settle_time_s": SETTLE_S, "ephemeris.settle_s": 5.0, "monitors.readmission_time_s": 10.0}
 
 
 def site(receivers: int = 4, systems: str = "GE", **station: Any) -> dict[str, Any]:

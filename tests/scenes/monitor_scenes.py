@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from gbas_ground.monitor_params import MonitorParams
 
 from gbas_core.gnss.ephemeris import Ephemeris
 from gbas_core.gnss.frames import azimuth_elevation, geodetic_from_ecef, rot_enu_ecef
@@ -15,6 +15,7 @@ from gbas_core.gnss.gpstime import epoch_key, from_epoch_key
 from gbas_core.gnss.observations import ObservationEpoch
 from gbas_core.gnss.orbits import predicted_state, rotated_range
 from gbas_core.io.recording import Recording
+from gbas_core.parameters import made_of
 from gbas_core.record import FloatArray
 from gbas_core.satellites import satellites_of
 from gbas_core.signals import L1, SPEED_OF_LIGHT_MPS
@@ -25,6 +26,7 @@ from gbas_ground.monitors.ionosphere_gradient import IonosphereGradientParams
 from gbas_ground.params import GroundParams
 from gbas_msgs_py.joining import ReceptionQueue
 from gbas_sim.world import SimulatedEpoch
+from ground_runs import receiver_values
 from recorded_sets import recorded_sets
 
 BRAUNSCHWEIG_M = np.array(
@@ -131,11 +133,10 @@ def simulated(epochs: Iterable[SimulatedEpoch], ephemeris: Ephemeris, params: Gr
     return list(monitor_epochs(rows, params))
 
 
-STATION = MonitorParams()
-"""What a station's monitors are set to that sets nothing else."""
-STATION_GAP_S = 3.5  # smoothing.max_gap_s
+STATION = braunschweig_station()
+"""A station that sets nothing of its monitors."""
 
 
 def station_gradient() -> IonosphereGradientParams:
     """The station's gradient monitor, along the runway; its carrier noise is that of the station."""
-    return STATION.gradient.params((float(RUNWAY_RAD),), STATION.carrier_noise.params())
+    return replace(STATION.gradient_monitor(), runway_bearing_rad=(float(RUNWAY_RAD),))

@@ -15,6 +15,7 @@ from gbas_chain.process import ProcessResult, prepare, process
 from gbas_chain.results import Row, error_statistics
 from gbas_core.gnss.frames import geodetic_from_ecef, rot_enu_ecef
 from gbas_core.gnss.gpstime import epoch_key
+from gbas_core.parameters import replaced
 from gbas_core.satellites import SAT_IDS
 from gbas_msgs_py.records import SolutionEpoch
 from gbas_studies.bounding import BoundingReport, bounding_report, error_series
@@ -78,7 +79,10 @@ def unsmoothed(name: str, data: Path, *, epochs: int | None = None) -> list[Solu
     prepared = prepare(request(name, data))
     raw = replace(
         prepared,
-        ground=replace(prepared.ground, tau_s=(0.0, 0.0), settle_time_s=0.0, readmission_time_s=0.0),
+        ground=replaced(
+            prepared.ground,
+            {"smoothing.tau_s": (0.0, 0.0), "smoothing.settle_time_s": 0.0, "monitors.readmission_time_s": 0.0},
+        ),
         airborne=replace(prepared.airborne, smoothing_tau_s=0.0, settle_s=0.0),
     )
     outputs = raw.chain().run(raw.epochs()[:epochs])

@@ -9,6 +9,7 @@ from gbas_core.io.recording import RecordedEpoch
 from gbas_core.io.rtcm import read_rtcm
 from gbas_core.ranging.divergence import GROUND
 from gbas_core.satellites import SAT_INDEX
+from gbas_core.signals import BANDS
 from gbas_ground.monitors.code_carrier_divergence import CcdParams
 from gbas_ground.monitors.two_frequency_divergence import TwoFrequencyParams, threshold
 from gbas_studies.ccd.empirical import cross_validated
@@ -74,7 +75,7 @@ def storm_part(number, data_dir, hours):
     chosen = STORM_SETS[number]
     recording = chosen.open(data_dir)
     first, last = (int(recording.keys[0]) + round(hour * 3.6e6) for hour in hours)
-    params = TwoFrequencyParams(other=chosen.other, filters=STORM_FILTERS)
+    params = TwoFrequencyParams(other_band=BANDS[chosen.other], filters=STORM_FILTERS)
     return monitor_epochs(
         recording.epochs(first=first, last=last), recording.ephemerides(), chosen.antennas_m(recording),
         CcdParams(filters=STORM_FILTERS), params,

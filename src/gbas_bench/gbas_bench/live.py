@@ -242,7 +242,7 @@ def _files_config(directory: Path) -> RunConfig:
     place = {"latitude_deg": math.degrees(latitude), "longitude_deg": math.degrees(longitude), "height_m": height_m}
     station["station"] |= {**place, "systems": "G"}
     station["receivers"] = {"rr1_ecef_m": list(GROUND_XYZ_M), "minimum": 1}
-    station["monitors"] = {"require_cn0": False}
+    station["signal_power"] = {"require_cn0": False}
     airborne = {"service": "C", "systems": "G", "use_unhealthy": True}  # this station claims no service
     document = {"/**": {"ros__parameters": {"ground": station, "airborne": airborne}}}
     path = directory / "files.yaml"

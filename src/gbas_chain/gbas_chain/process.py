@@ -282,10 +282,10 @@ def _ground_sections(
     receivers.setdefault("minimum", min(2, len(positions)))
     smoothing = sections.setdefault("smoothing", {})
     smoothing.setdefault("max_gap_s", max(3.5, 1.5 * max(file.interval_s or 0.0 for file in recording.ground)))
-    monitors = sections.setdefault("monitors", {})
+    power = sections.setdefault("signal_power", {})
     without = [file.path.name for file in recording.ground if not np.isfinite(file.cn0_dbhz[:, 0]).any()]
-    if without and "require_cn0" not in monitors:
-        monitors["require_cn0"] = False
+    if without and "require_cn0" not in power:
+        power["require_cn0"] = False
         notes.append(f"{', '.join(without)}: no C/N0 in the file, so signal power is not monitored")
     if request.fas is not None:
         sections["approaches"] = {"fas": dict(_fas(request.fas))}

@@ -22,6 +22,7 @@ import dataclasses
 import difflib
 import functools
 import math
+import re
 import typing
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
@@ -30,6 +31,7 @@ from typing import Any, Final, TypeVar, dataclass_transform
 import pydantic.dataclasses
 import pydantic_core
 from pydantic import ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler, TypeAdapter, ValidationError
+from pydantic.dataclasses import is_pydantic_dataclass
 from pydantic.json_schema import GenerateJsonSchema
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
@@ -84,7 +86,10 @@ class Parameter:
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         """Lists become tuples and angles of files radians; then the exact kinds, then the bounds."""
-        inner = core_schema.with_info_before_validator_function(self._in_own_units, _strict(handler(source)))
+        schema = _strict(handler(source))
+        inner = core_schema.with_info_before_validator_function(self._in_own_units, schema)
+        if schema["type"] == "literal":
+            inner = core_schema.no_info_before_validator_function(partial(_same_kind, schema["expected"]), inner)
         return core_schema.no_info_after_validator_function(self._within, inner)
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
@@ -130,7 +135,7 @@ class Parameter:
                 raise PydanticCustomError(
                     _OUT_OF_BOUNDS,
                     "{shown} is not {bounds}",
-                    {"shown": f"{shown!r}", "bounds": self.bounds()},
+                    {"shown": f"{shown:.10g}", "bounds": self.bounds()},
                 )
         return value
 
@@ -386,6 +391,13 @@ def _numbers(value: Any) -> Iterator[float]:
         yield value
 
 
+def _same_kind(choices: list[Any], value: Any) -> Any:
+    """Refuse what only equals a choice: True is no 1."""
+    if type(value) not in map(type, choices):
+        raise PydanticCustomError("literal_error", "is no choice", {"expected": ", ".join(map(repr, choices))})
+    return value
+
+
 _SCALARS: Final = ("float", "int", "bool", "str")
 
 
@@ -428,13 +440,11 @@ def _explained(kind: type[Any], error: ValidationError, section: str = "") -> Pa
         known = _keys(_section_at(kind, path[:-1]))
         return ParameterError(f"{'.'.join((*key.split('.')[:-1], path[-1]))} is unknown{_nearest(path[-1], known)}")
     if reason in _MISSING:
-        parameter = _parameter_of(_hints(_section_at(kind, path[:-1])).get(_field_of(path[-1])))
-        return ParameterError(f"{key} is missing" + (f" ({parameter.doc})" if parameter else ""))
+        return ParameterError(_missing(_hints(_section_at(kind, path[:-1])).get(_field_of(path[-1])), key))
     if reason == _OUT_OF_BOUNDS:
         return ParameterError(f"{key} = {found['msg']}")
     if reason in ("value_error", "assertion_error"):
-        own = str(found["ctx"]["error"])
-        return ParameterError(f"{key}: {own}" if key else own)
+        return ParameterError(_below(kind, path, key, str(found["ctx"]["error"])))
     if reason == "literal_error":
         return ParameterError(f"{key} = {value!r} is not one of {found['ctx']['expected'].replace(' or ', ', ')}")
     return ParameterError(f"{key} = {value!r} {_KINDS.get(reason, found['msg'])}")
@@ -442,6 +452,28 @@ def _explained(kind: type[Any], error: ValidationError, section: str = "") -> Pa
 
 def _is_missing(problem: Mapping[str, Any]) -> bool:
     return problem["type"] in _MISSING and not isinstance(problem["loc"][-1], int)
+
+
+def _missing(hint: Any, key: str) -> str:
+    """A parameter that is missing; of a section the first one it needs."""
+    while dataclasses.is_dataclass(hint):
+        section = hint
+        needed = [each for each in dataclasses.fields(section) if _default(each) is dataclasses.MISSING]
+        if not needed:
+            break
+        key, hint = f"{key}.{file_key(needed[0].name)}", _hints(section)[needed[0].name]
+    parameter = _parameter_of(hint)
+    return f"{key} is missing" + (f" ({parameter.doc})" if parameter else "")
+
+
+def _below(kind: type[Any], path: tuple[str, ...], key: str, text: str) -> str:
+    """What a section, or a field with sections in it, says of itself; it may begin with one of its own keys."""
+    if not key:
+        return text
+    section = _section_at(kind, path)
+    is_section = not path or section is not _section_at(kind, path[:-1])
+    first = re.split(r"[ .:=]", text, maxsplit=1)[0]
+    return f"{key}.{text}" if not is_section or first in _keys(section) else f"{key}: {text}"
 
 
 def _nearest(name: str, known: list[str]) -> str:
@@ -467,7 +499,7 @@ def _section_at(kind: Any, path: tuple[str, ...]) -> Any:
     """Class of the section that a path of keys leads to; the last one that is known."""
     for key in path:
         hint = _hints(kind).get(_field_of(key))
-        inner = next((each for each in _classes(hint) if dataclasses.is_dataclass(each)), None)
+        inner = next((each for each in _classes(hint) if is_pydantic_dataclass(each)), None)
         if inner is None:
             return kind
         kind = inner

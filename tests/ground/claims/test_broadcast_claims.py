@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
 
+from gbas_core.parameters import replaced
 from gbas_ground.claims.broadcast_claims import orbit_claim, statements, supported_gcid, unsupported
-from gbas_ground.params import GCID_UNHEALTHY
+from gbas_ground.sections import GCID_UNHEALTHY
 from monitor_scenes import braunschweig_station
 
 FULL = {
@@ -76,8 +75,8 @@ def test_designator_follows_from_the_monitors(count: int, sections: dict, gcid: 
 def test_a_designator_that_is_only_declared_is_called_so() -> None:
     one = braunschweig_station(1)
     assert list(unsupported(one)) == [
-        "no B values: receivers.minimum is 1", "gradient does not exclude", "orbits are not monitored",
+        "no B values: receivers.minimum is 1", "ionosphere_gradient does not exclude", "orbits are not monitored",
     ]  # fmt: skip
     assert statements(one)[-1].startswith("gcid 1 (declared; no B values: receivers.minimum is 1; ")
-    no_bound = replace(braunschweig_station(4, gast_d={"enabled": True}), gcid=2)
+    no_bound = replaced(braunschweig_station(4, gast_d={"enabled": True}), {"station.gcid": 2})
     assert statements(no_bound)[-1] == "gcid 2 (declared; no bound on gradients)"

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from gbas_core.parameters import ParameterError
-from gbas_core.signals import L1
-from gbas_ground.claims.gradient_claim import MAX_M_EIG, MAX_Y_EIG_M, coverage_by_elevation, gradient_claim
+from gbas_ground.claims.gradient_claim import coverage_by_elevation, gradient_claim
+from gbas_ground.claims.limits import MAX_M_EIG, MAX_Y_EIG_M
 from gbas_ground.monitors.carrier_noise import CarrierNoise
 from gbas_ground.monitors.gradient_detectability import BaselineMonitor, coverage_percent
 from gbas_ground.monitors.ionosphere_gradient import IonosphereGradientParams, gradient_site
@@ -39,7 +39,7 @@ def test_the_published_bound_follows_from_300_mm_per_km() -> None:
 @pytest.mark.parametrize("elevation_deg", [20.0, 45.0, 90.0])
 def test_coverage_is_that_of_the_intervals(elevation_deg: float) -> None:
     """One band and one runway, from projected lengths and sigmas written out."""
-    params = IonosphereGradientParams(runway_bearing_rad=(RUNWAY_RAD,), bands=(L1,))
+    params = IonosphereGradientParams(runway_bearing_rad=(RUNWAY_RAD,), carriers=("L1",))
     site = site_of(3, params)
     along = site.baselines.vector_m[:, :2] @ [np.sin(RUNWAY_RAD), np.cos(RUNWAY_RAD)]
     one, other = (0.0012 + 0.010 * np.exp(-each / 20.0) for each in (elevation_deg, 30.0))
@@ -63,16 +63,32 @@ def test_coverage_is_that_of_the_intervals(elevation_deg: float) -> None:
     ("count", "sections", "expected"),
     [
         (2, {"gast_d": TYPE_D}, "gast_d.y_eig_m = 1.3 is below what the site's gradient monitor supports (nothing: "),
-        (4, {"gast_d": TYPE_D}, "with ionosphere_gradient.min_coverage = 0, gradients up to 2000 mm/km may go undetected"),
+        (
+            4,
+            {"gast_d": TYPE_D},
+            "with ionosphere_gradient.min_coverage = 0, gradients up to 2000 mm/km may go undetected",
+        ),
         (2, {"gast_d": TYPE_D, "ionosphere_gradient": FULL}, "the baselines detect at most 5"),
-        (4, {"gast_d": TYPE_D, "ionosphere_gradient": {**FULL, "exclude": False}, **QUIET}, "ionosphere_gradient.exclude is false"),
+        (
+            4,
+            {"gast_d": TYPE_D, "ionosphere_gradient": {**FULL, "exclude": False}, **QUIET},
+            "ionosphere_gradient.exclude is false",
+        ),
         (
             4,
             {"gast_d": {**TYPE_D, "y_eig_m": 1.2}, "ionosphere_gradient": FULL, **QUIET},
             "y_eig_m = 1.2 is below what the site's",
         ),
-        (4, {"gast_d": {**TYPE_D, "y_eig_m": 1.2}, "ionosphere_gradient": FULL, **QUIET}, "(1.3 m: all of 300 to 2000 mm/km"),
-        (4, {"gast_d": {**TYPE_D, "m_eig": 0.2e-3}, "ionosphere_gradient": FULL, **QUIET}, "gast_d.m_eig = 0.0002 is below"),
+        (
+            4,
+            {"gast_d": {**TYPE_D, "y_eig_m": 1.2}, "ionosphere_gradient": FULL, **QUIET},
+            "(1.3 m: all of 300 to 2000 mm/km",
+        ),
+        (
+            4,
+            {"gast_d": {**TYPE_D, "m_eig": 0.2e-3}, "ionosphere_gradient": FULL, **QUIET},
+            "gast_d.m_eig = 0.0002 is below",
+        ),
         (4, {"gast_d": {**TYPE_D, "y_eig_m": 3.0}}, "gast_d.m_eig = 0.0003 is below"),
         (
             4,
@@ -102,7 +118,13 @@ def test_smaller_bounds_are_refused_by_name(count: int, sections: dict, expected
                 **QUIET,
             },
         ),
-        (2, {"gast_d": {**TYPE_D, "y_eig_m": 2.6, "m_eig": 0.6e-3}, "ionosphere_gradient": {"gradient_range": [3e-4, 6e-4]}}),
+        (
+            2,
+            {
+                "gast_d": {**TYPE_D, "y_eig_m": 2.6, "m_eig": 0.6e-3},
+                "ionosphere_gradient": {"gradient_range": [3e-4, 6e-4]},
+            },
+        ),
     ],
     ids=["largest", "full coverage", "range begins at 500", "range ends at 600"],
 )

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 import pytest
-from gbas_ground.monitor_params import EphemerisSection, MonitorParams
 
-from gbas_core.parameters import ParameterError
+from gbas_core.parameters import ParameterError, replaced
 from gbas_ground.claims.orbit_claim import (
     MAX_DECORRELATION,
     OrbitSite,
@@ -25,12 +23,13 @@ from ground_runs import half_seconds, params, run
 from monitor_scenes import BRAUNSCHWEIG_M, braunschweig_station, station_of
 from synthetic_ranges import truth
 
-WATCHING = replace(MonitorParams(), ephemeris=EphemerisSection(exclude=False))
+WATCHING = {"ephemeris_residual__exclude": False}
 DESCENT_RAD = np.radians(3.0)
 
 
 def site_of(count: int = 4, **changes: object) -> OrbitSite:
-    return replace(station_of(BRAUNSCHWEIG_M[:count], "G"), **changes).orbit_site()
+    station = station_of(BRAUNSCHWEIG_M[:count], "G")
+    return replaced(station, {name.replace("__", "."): value for name, value in changes.items()}).orbit_site()
 
 
 def scanned(site: OrbitSite, elevation_rad: float, seen: np.ndarray, azimuths: int = 72) -> float:
@@ -158,22 +157,20 @@ def test_receivers_that_drop_out_take_the_claim_with_them() -> None:
     assert broadcast_p(two) == pytest.approx(MAX_DECORRELATION, abs=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("receivers", "changes"), [(1, {}), (2, {}), (4, {"monitors": WATCHING})], ids=["one", "two", "watching"]
-)
+@pytest.mark.parametrize(("receivers", "changes"), [(1, {}), (2, {}), (4, WATCHING)], ids=["one", "two", "watching"])
 def test_what_is_not_monitored_is_not_claimed(receivers: int, changes: dict) -> None:
     _, out = ran(receivers, **changes)
     assert broadcast_p(out.integrity[-1]) == pytest.approx(MAX_DECORRELATION, abs=1e-12)
 
 
 def test_external_monitor_is_taken_at_its_word() -> None:
-    _, out = ran(2, external_monitor="network of reference stations", p_ephemeris=1.5e-4)
+    _, out = ran(2, ephemeris__external_monitor="network of reference stations", ephemeris__p=1.5e-4)
     assert broadcast_p(out.integrity[-1]) == pytest.approx(1.5e-4, abs=1e-12)
 
 
 @pytest.mark.parametrize(
     "changes",
-    [{"monitors": replace(MonitorParams(), ephemeris=EphemerisSection(required=True))}, {"gast_d": True}],
+    [{"ephemeris_residual__required": True}, {"gast_d__enabled": True}],
     ids=["required", "type D"],
 )
 def test_unmonitored_orbits_are_not_used_where_they_must_be_monitored(changes: dict) -> None:
@@ -214,7 +211,7 @@ def test_unmonitored_orbits_are_not_used_where_they_must_be_monitored(changes: d
             "ephemeris.p_d = 0.0001 is below",
         ),
         (4, {"ephemeris": {"external_monitor": "SBAS"}}, "ephemeris.p is missing: what ephemeris.external_monitor"),
-        (4, {"ephemeris": {"external_monitor": 1}}, "ephemeris.external_monitor = 1 is not a name"),
+        (4, {"ephemeris": {"external_monitor": 1}}, "ephemeris.external_monitor = 1 is not a text"),
     ],
 )
 def test_smaller_p_is_refused_by_name(count: int, sections: dict, expected: str) -> None:
@@ -234,4 +231,4 @@ def test_smaller_p_is_refused_by_name(count: int, sections: dict, expected: str)
     ],
 )
 def test_supported_or_declared_p_is_accepted_as_given(count: int, ephemeris: dict) -> None:
-    assert braunschweig_station(count, ephemeris=ephemeris).p_ephemeris == ephemeris.get("p", 0.0)
+    assert braunschweig_station(count, ephemeris=ephemeris).ephemeris.p == ephemeris.get("p", 0.0)

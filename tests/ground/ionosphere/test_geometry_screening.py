@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 import front_screening
 from gbas_bringup.resources import named_config
-from gbas_core.parameters import ParameterError
+from gbas_core.parameters import ParameterError, replaced
 from gbas_core.satellites import N_SATS, SAT_INDEX
 from gbas_ground.corrections.sigma import broadcast_sigmas
 from gbas_ground.ionosphere.geometry_screening import judge, least_safe, sent_sigma_m, subsets_of
@@ -21,7 +19,8 @@ from gbas_ground.ionosphere.protection import (
     protect,
     protection_in_words,
 )
-from gbas_ground.params import MAX_SIGMA_VIG, GroundParams
+from gbas_ground.params import GroundParams
+from gbas_ground.sections import MAX_SIGMA_VIG
 from gbas_sim.scenario import read_sections
 
 # A sky of 52 degrees north: elevations and azimuths as they are at Braunschweig at the end of the quiet approach [deg].
@@ -281,13 +280,13 @@ def test_more_threat_takes_more_inflation():
     ("change", "message"),
     [
         ({"approaches": ()}, "at least one approach"),
-        ({"max_use_distance_m": 0.0}, "not unlimited"),
-        ({"max_use_distance_m": 80_000.0}, "at most 60000 m"),
+        ({"station.max_use_distance_m": 0.0}, "not unlimited"),
+        ({"station.max_use_distance_m": 80_000.0}, "at most 60000 m"),
     ],
 )
 def test_what_cannot_be_screened_is_not_accepted(change, message):
     with pytest.raises(ParameterError, match=message):
-        replace(station(), **change)
+        replaced(station(), change)
 
 
 @pytest.mark.parametrize(
@@ -297,8 +296,8 @@ def test_what_cannot_be_screened_is_not_accepted(change, message):
         ({"threat_model": "custom"}, "not lists of one length"),
         ({"gradient": [1e-4], "elevation_deg": [0.0]}, "is not custom"),
         ({"affected": 3}, "ionosphere.affected = 3 is not within 1 to 2"),
-        ({"aircraft_systems": ["GX"]}, "is not a list of G, E and GE"),
-        ({"aircraft_speed_mps": [80.0, 60.0]}, "the lower first"),
+        ({"aircraft_systems": ["GX"]}, "is not one of 'G', 'E', 'GE'"),
+        ({"aircraft_speed_mps": [80.0, 60.0]}, "not the lower one first"),
     ],
 )
 def test_bad_parameters_are_named(ionosphere, message):

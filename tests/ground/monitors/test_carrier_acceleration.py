@@ -22,9 +22,9 @@ from gbas_ground.monitors.carrier_acceleration import (
 )
 from gbas_ground.monitors.double_difference import Troposphere, baselines_of, carrier_residual_m
 from loop_acceleration import loop_statistics
-from monitor_scenes import STATION, STATION_GAP_S, recorded_pair
+from monitor_scenes import STATION, recorded_pair
 
-PARAMS = STATION.acceleration.params(STATION_GAP_S)
+PARAMS = STATION.carrier_acceleration_monitor()
 BANDS, T = 2, 0.5
 HERE = np.isin(np.arange(N_SATS), [0, 3, 5, 9, 12, 17, 20, 30, 33, 37, 40, 45, 51, 60])
 ELEVATION = np.where(HERE, np.radians(8.0 + 1.1 * np.arange(N_SATS)), np.nan)
@@ -302,7 +302,7 @@ def test_detection_is_far_below_what_hurts():
         ({"min_satellites": 1}, "min_satellites"),
         ({"window_s": float("nan")}, "window_s"),
         ({"natural": (0.0, -1.0, 0.0)}, "natural"),
-        ({"p_false_alarm": 0.0}, "probability"),
+        ({"p_false_alarm": 0.0}, "p_false_alarm"),
     ],
 )
 def test_bad_parameters(changes, word):

@@ -29,10 +29,10 @@ from gbas_ground.monitors.ephemeris_residual import (
     site_decorrelation,
 )
 from loop_decorrelation import scanned_decorrelation
-from monitor_scenes import BRAUNSCHWEIG_M, STATION, recorded_pair, station_gradient
+from monitor_scenes import BRAUNSCHWEIG_M, STATION, recorded_pair
 from synthetic_ranges import LATITUDE_RAD, LONGITUDE_RAD, TOW_S, WEEK, constellation
 
-PARAMS = STATION.ephemeris.params(station_gradient().bands)
+PARAMS = STATION.ephemeris_monitor()
 NOISE = CarrierNoise()
 SITE = baselines_of(BRAUNSCHWEIG_M, BRAUNSCHWEIG_M[0])
 HERE = np.arange(N_SATS) < 9
@@ -235,21 +235,19 @@ def test_missing_is_not_good():
     value[1:, :, 5] = np.nan  # one baseline left: looked at
     value[:, 1, 6] = np.nan  # L1 alone: looked at
     gone = replace(one, residual_m=value, sigma_m=np.where(np.isnan(value), np.nan, 0.005))
-    required = replace(PARAMS, required=True)
-    _, results = run([one, gone], params=required)
-    assert np.flatnonzero(results[1].failed).tolist() == [3]
     _, results = run([one, gone])
+    assert np.flatnonzero(HERE & np.isnan(results[1].statistic)).tolist() == [3]
     assert not results[1].failed.any()
     nothing = replace(one, residual_m=np.full(SHAPE, np.nan), sigma_m=np.full(SHAPE, np.nan))
-    _, results = run([nothing], params=required)
-    assert (results[0].failed == HERE).all()
+    _, results = run([nothing])
+    assert np.isnan(results[0].statistic).all()
     single = baselines_of(BRAUNSCHWEIG_M[:1], BRAUNSCHWEIG_M[0])
     empty = np.zeros((0, 2, N_SATS))
     none = DoubleDifferences(
         residual_m=empty, sigma_m=empty, nominal_sigma_m=empty, reference=np.zeros(empty.shape, dtype=np.int64)
     )
-    _, results = run([none], site=single, params=required)
-    assert (results[0].failed == HERE).all()
+    _, results = run([none], site=single)
+    assert np.isnan(results[0].statistic).all()
 
 
 @pytest.mark.parametrize(("name", "bands"), [("upc1_upc2", (L1, L2)), ("mosaic_base_rover", (L1, L5))])
@@ -288,7 +286,7 @@ def test_reference_point_is_where_it_is_thought():
         ({"bands": ()}, "bands"),
         ({"p_missed_detection": 0.6}, "p_missed_detection"),
         ({"max_gap_s": 0.0}, "max_gap_s"),
-        ({"p_false_alarm": 1.0}, "probability"),
+        ({"p_false_alarm": 1.0}, "p_false_alarm"),
     ],
 )
 def test_bad_parameters(changes, word):

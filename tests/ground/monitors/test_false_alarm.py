@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.stats import chi2, multivariate_normal, norm
@@ -11,8 +9,9 @@ from scipy.stats import chi2, multivariate_normal, norm
 from divergence_loops import filtered_rates
 from gbas_core.parameters import ParameterError
 from gbas_core.ranging.divergence import white_noise_correlation, white_noise_gain
-from gbas_ground.monitor_params import FALSE_EXCLUSION_OF_ALL, CcdSection, MonitorParams, TwoFrequencySection
 from gbas_ground.monitors.false_alarm import EPOCH_S, EXPOSURE_S, exposure_probability, independent_samples
+from gbas_ground.param_checks import FALSE_EXCLUSION_OF_ALL, false_exclusions
+from ground_runs import params
 
 ALPHA = 0.5 / 30.0
 
@@ -62,25 +61,31 @@ def test_it_bounds_what_the_filters_do(freedom):
 
 
 def test_published_thresholds_keep_the_budget():
-    shares = MonitorParams().false_exclusions()
+    shares = false_exclusions(params())
     # 0.0233 m/s is 5.84 sigma, 5.2e-9 an epoch on both sides; 15 s are some 17 independent samples of it.
     assert shares["ccd"] == pytest.approx(17.4 * 2.0 * norm.sf(0.0233 / 0.00399), rel=0.01)
     assert shares["ccd_f"] == pytest.approx(18.6e-9, rel=0.01)
     assert sum(shares.values()) <= FALSE_EXCLUSION_OF_ALL == 2e-7
-    assert set(shares) >= {"gradient", "acceleration", "ephemeris_residual", "power", "sigma_monitor"}
+    assert set(shares) >= {
+        "ionosphere_gradient",
+        "carrier_acceleration",
+        "ephemeris_residual",
+        "signal_power",
+        "sigma_monitor",
+    }
     assert EXPOSURE_S / EPOCH_S == 30.0
 
 
 def test_thresholds_beyond_the_budget_are_refused():
     with pytest.raises(ParameterError, match=r"ccd 5\.\de-07.*budget of 2e-07: ccd.threshold_mps over ccd.sigma_mps"):
-        MonitorParams(ccd=CcdSection(threshold_mps=0.022))
+        params(ccd__threshold_mps=0.022)
     with pytest.raises(ParameterError, match="budget of 2e-07"):
-        MonitorParams(ccd_f=TwoFrequencySection(p_false_alarm=1e-8))
+        params(ccd_f__p_false_alarm=1e-8)
     # whoever sets a smaller sigma, or lets the monitor only watch, says so
-    MonitorParams(ccd=CcdSection(threshold_mps=0.022, sigma_mps=0.0037))
-    MonitorParams(ccd=CcdSection(threshold_mps=0.010, exclude=False))
-    MonitorParams(ccd_f=TwoFrequencySection(p_false_alarm=1e-8, exclude="none"))
-    assert replace(CcdSection(), sigma_mps=0.002).params(230.0, 3.5).sigma_mps == 0.002
+    params(ccd__threshold_mps=0.022, ccd__sigma_mps=0.0037)
+    params(ccd__threshold_mps=0.010, ccd__exclude=False)
+    params(ccd_f__p_false_alarm=1e-8, ccd_f__exclude="none")
+    assert params(ccd__sigma_mps=0.002).ccd_monitor().sigma_mps == 0.002
 
 
 def test_bad_arguments():

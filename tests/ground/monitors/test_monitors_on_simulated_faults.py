@@ -33,7 +33,7 @@ from gbas_sim.atmosphere.troposphere import Troposphere as SimulatedTroposphere
 from gbas_sim.faults.kinds import ExcessiveAcceleration, LowPower, OrbitFault
 from gbas_sim.receivers.presets import receiver_preset
 from gbas_sim.world import World, WorldParams
-from monitor_scenes import BRAUNSCHWEIG_M, RUNWAY_RAD, STATION, STATION_GAP_S, simulated, station_gradient, station_of
+from monitor_scenes import BRAUNSCHWEIG_M, RUNWAY_RAD, STATION, simulated, station_gradient, station_of
 
 AIR = Troposphere(refractivity=330.0, scale_height_m=7900.0)
 BANDS, T, SETTLED, TIME_TO_ALERT_S = (L1, L5), 0.5, 12, 1.5
@@ -58,9 +58,9 @@ def verdicts(*, seconds=12.0, seed=1, **threats):
     gradient = station_gradient()
     site = gradient_site(BRAUNSCHWEIG_M, BRAUNSCHWEIG_M[0], gradient)
     settings = (
-        STATION.acceleration.params(STATION_GAP_S),
-        STATION.expected_power.params(STATION_GAP_S),
-        STATION.ephemeris.params(gradient.bands),
+        STATION.carrier_acceleration_monitor(),
+        STATION.expected_power_monitor(),
+        STATION.ephemeris_monitor(),
     )
     moved = initial_carrier_acceleration(4, settings[0])
     power = initial_power_expectation(4, settings[1])
@@ -152,7 +152,7 @@ def test_an_orbit_beyond_the_minimum_detectable_error():
     elevation, azimuth = (each[[satellite]] for each in (epochs[-1].elevation_rad, epochs[-1].azimuth_rad))
     gradient = station_gradient()
     baselines = gradient_site(BRAUNSCHWEIG_M, BRAUNSCHWEIG_M[0], gradient).baselines
-    p = site_decorrelation(baselines, elevation, azimuth, gradient.noise, STATION.ephemeris.params(gradient.bands))
+    p = site_decorrelation(baselines, elevation, azimuth, gradient.noise, STATION.ephemeris_monitor())
     error_m = 1.3 * float(p[0]) * float(epochs[-1].range_m[0, satellite])
     # along and cross are not quite across the line of sight: 1.3 allows for 40 degrees
     assert 1000.0 < error_m < 5000.0

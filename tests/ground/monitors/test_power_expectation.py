@@ -17,9 +17,9 @@ from gbas_ground.monitors.power_expectation import (
     power_expectation_step,
 )
 from loop_power import loop_average, loop_minimum, mean_of
-from monitor_scenes import STATION, STATION_GAP_S, recorded_pair
+from monitor_scenes import STATION, recorded_pair
 
-PARAMS = STATION.expected_power.params(STATION_GAP_S)
+PARAMS = STATION.expected_power_monitor()
 HERE = np.isin(np.arange(N_SATS), [0, 3, 5, 9, 12, 17, 33, 37, 40, 45, 60])
 ELEVATION = np.where(HERE, np.radians(6.0 + 1.3 * np.arange(N_SATS)), np.nan)
 DUE = np.broadcast_to(HERE, (4, N_SATS))
@@ -69,7 +69,12 @@ def test_false_alarms_are_those_of_the_formula():
     sigma, receivers, probability = 1.5, 3, 0.3
     minimum = float(minimum_from_expectation(42.0, sigma, receivers, probability=probability))
     params = PowerExpectationParams(
-        elevation_rad=(0.1,), minimum_dbhz=((minimum,),) * N_BANDS, average_s=0.1, channel_margin_db=30.0
+        elevation_rad=(0.1,),
+        average_s=0.1,
+        channel_margin_db=30.0,
+        minimum_l1_dbhz=(minimum,),
+        minimum_l2_dbhz=(minimum,),
+        minimum_l5_dbhz=(minimum,),
     )
     values = 42.0 + sigma * rng.normal(size=(3000, receivers, N_BANDS, N_SATS))
     _, results = run(values, params=params)
@@ -171,8 +176,8 @@ def test_recorded_pair_has_power(data_dir):
 @pytest.mark.parametrize(
     ("changes", "word"),
     [
-        ({"elevation_rad": (0.3, 0.2), "minimum_dbhz": ((30.0, 30.0),) * 3}, "elevation_rad"),
-        ({"minimum_dbhz": ((30.0,),) * 3}, "minimum_dbhz"),
+        ({"elevation_rad": (0.3, 0.2)}, "elevation_deg is not one node or more, rising"),
+        ({"minimum_l2_dbhz": (30.0,)}, "minimum_l2_dbhz"),
         ({"average_s": 0.0}, "average_s"),
         ({"channel_margin_db": -1.0}, "channel_margin_db"),
         ({"bands": (0, 0)}, "bands"),

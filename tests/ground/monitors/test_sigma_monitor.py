@@ -22,7 +22,7 @@ from gbas_ground.monitors.sigma_monitor import (
 from loop_sigma import correlated, dense_distribution, stored_estimates
 from monitor_scenes import STATION
 
-PARAMS = STATION.sigma.params()
+PARAMS = STATION.sigma_monitor
 HERE = np.arange(N_SATS) < 10
 STEP_S = 50.0
 

@@ -126,7 +126,9 @@ def test_steady_state_of_each_mode_is_eq_17(mode):
     assert result.paper.failed[FAULTY]
 
 
-@pytest.mark.parametrize(("other", "params"), [(L5, QUICK), (L2, TwoFrequencyParams(other=L2, filters=QUICK.filters))])
+@pytest.mark.parametrize(
+    ("other", "params"), [(L5, QUICK), (L2, TwoFrequencyParams(other_band="L2", filters=QUICK.filters))]
+)
 def test_an_ionosphere_is_not_seen(other, params):
     ratio = iono_ratio(L1, other)
     world = World(other=other, fault=(0.5, 0.5 * ratio, -0.5, -0.5 * ratio))
@@ -136,7 +138,7 @@ def test_an_ionosphere_is_not_seen(other, params):
 
 
 def test_first_and_second_band_of_any_pair():
-    params = TwoFrequencyParams(other=L2, filters=QUICK.filters)
+    params = TwoFrequencyParams(other_band="L2", filters=QUICK.filters)
     world = World(other=L2, fault=(0.02, 0.01, -0.03, 0.005))
     result = run(world, params=params, epochs=STEADY)
     assert result.mean_mps[:, FAULTY] == pytest.approx(combination_matrix(L1, L2) @ world.fault, abs=1e-5)
@@ -177,7 +179,7 @@ def test_two_faults_at_once_stay_with_their_satellites():
 
 def test_suspicion_falls_on_the_fault_though_others_with_smaller_sigmas_pass_first():
     covariance = StatisticCovariance(elevation_rad=(0.2, 0.5), factor=((1.0, 1.0, 10.0), (1.0, 1.0, 1.0)))
-    params = TwoFrequencyParams(filters=QUICK.filters, zenith_delay_m=0.0, covariance=covariance)
+    params = TwoFrequencyParams(filters=QUICK.filters, zenith_delay_m=0.0).with_covariance(covariance)
 
     def change(number, seen):
         seen["elevation_rad"][FAULTY] = 0.1  # ten times the sigma: the others would fail with a quarter of the fault
@@ -367,7 +369,7 @@ def test_gamma_of_the_loops_is_the_suites():
 
 @pytest.mark.parametrize(
     "wrong",
-    [{"band": 3}, {"other": L1}, {"p_false_alarm": 0.0}, {"min_clock_satellites": 0}, {"zenith_delay_m": -1.0}],
+    [{"band": 3}, {"other_band": "L1"}, {"p_false_alarm": 0.0}, {"min_clock_satellites": 0}, {"zenith_delay_m": -1.0}],
 )
 def test_parameters_are_checked(wrong):
     with pytest.raises(ValueError, match=next(iter(wrong))):

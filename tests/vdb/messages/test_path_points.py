@@ -175,10 +175,9 @@ def test_station_files_take_records_and_check_them(station_mapping: dict[str, An
 @pytest.fixture(name="station_mapping")
 def _station_mapping() -> dict[str, Any]:
     from gbas_bringup.resources import config_path
-    from gbas_ground.params import ground_section
+    from gbas_core.configuration import read_configuration
 
-    path = config_path("nominal_station.yaml")
-    sections = dict(ground_section(yaml.safe_load(path.read_text(encoding="utf-8")), str(path)))
+    sections = read_configuration(config_path("nominal_station.yaml")).section("ground")
     place = {"latitude_deg": 44.47, "longitude_deg": -73.15, "height_m": 72.0}
     sections["station"] = {**sections.get("station", {}), **place}
     sections["receivers"] = {"rr1_ecef_m": [1_320_000.0, -4_365_000.0, 4_445_000.0], "minimum": 1}

@@ -117,13 +117,14 @@ def gradient_claim(
     """
     low, high = (1e6 * each for each in params.gradient_range)
     if not excludes:
-        return _claim(math.inf, "gradient.exclude is false", tau_s, speed_mps)
+        return _claim(math.inf, "ionosphere_gradient.exclude is false", tau_s, speed_mps)
     reached = coverage_by_elevation(site, params, np.radians(np.arange(5.0, 91.0)))
     if not (reached >= params.min_coverage).any() or not reached.any():
         why = f"the baselines detect at most {100.0 * reached.max():.1f} % of {low:g} to {high:g} mm/km"
         return _claim(math.inf, why, tau_s, speed_mps)
     if params.min_coverage < 1.0:
-        why = f"with gradient.min_coverage = {params.min_coverage:g}, gradients up to {high:g} mm/km may go undetected"
+        least = f"ionosphere_gradient.min_coverage = {params.min_coverage:g}"
+        why = f"with {least}, gradients up to {high:g} mm/km may go undetected"
         return _claim(params.gradient_range[1], why, tau_s, speed_mps)
     first = 5 + int(np.argmax(reached >= 1.0))
     why = f"all of {low:g} to {high:g} mm/km is detected, above {first} deg with every baseline"
