@@ -203,9 +203,9 @@ def test_play_only_ends_by_itself(fake_bag: Any, tmp_path: Path, domain: int) ->
 @pytest.mark.parametrize(
     ("parameters", "words"),
     [
-        ((), "parameter 'bag' is ''"),
+        ((), "bag is missing (folder of a bag, or a .mcap file)"),
         (("bag:=/nowhere",), "/nowhere: there is no such bag"),
-        (("bag:=/nowhere", "mode:=some"), "parameter 'mode' is 'some'"),
+        (("bag:=/nowhere", "mode:=some"), "mode = 'some' is not one of 'inputs', 'all'"),
     ],
 )
 def test_bad_parameters_end_it_with_one_line(domain: int, parameters: tuple[str, ...], words: str) -> None:

@@ -103,7 +103,9 @@ def exposure_probability(
     # What is 12 deviations of a step below the threshold does not pass it in one step.
     lowest = max(0.0, limit - 12.0 * np.sqrt(rest))
     below = lowest + 0.5 * (limit - lowest) * (1.0 + _NODES)
-    log_chi2 = xlogy(freedom / 2.0 - 1.0, below**2) - below**2 / 2.0 - gammaln(freedom / 2.0) - np.log(2.0) * freedom / 2.0
+    log_chi2 = (
+        xlogy(freedom / 2.0 - 1.0, below**2) - below**2 / 2.0 - gammaln(freedom / 2.0) - np.log(2.0) * freedom / 2.0
+    )
     density = 2.0 * below * np.exp(log_chi2)
     passing = 1.0 - chndtr(limit**2 / rest, float(freedom), correlation**2 * below**2 / rest)
     upward = 0.5 * (limit - lowest) * float(_WEIGHTS @ (density * passing))

@@ -12,14 +12,17 @@ from gbas_ground.nodes.configuration import station_params
 from gbas_ground.station import GroundEpoch, GroundStation, initial_monitor_state
 from gbas_msgs_py import tables, topics
 from gbas_msgs_py.joining import EpochJoiner, JoinedEpoch
-from gbas_node.node import GbasNode, JoiningParams, run
+from gbas_node.node import GbasNode, run
+from gbas_node.params import JoiningParams
 
 
 class IntegrityMonitor(GbasNode):
     """Joins the receivers by epoch and runs :meth:`GroundStation.monitor`."""
 
+    params_type = JoiningParams
+
     def __init__(self, **kwargs: Any) -> None:
-        super().__init__("integrity_monitor", JoiningParams, **kwargs)
+        super().__init__("integrity_monitor", **kwargs)
         self.station = station_params(self, self.params.config)
         self.state = initial_monitor_state(self.station)
         self.receivers = tuple(f"rr{j}" for j in range(1, self.station.n_receivers + 1))
