@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = sorted(path.parent for path in (ROOT / "src").glob("*/setup.py"))
 NAMES = [path.name for path in PACKAGES]
 # Distributions whose modules have another name.
-DISTRIBUTION = {"yaml": "PyYAML"}
+DISTRIBUTION = {"yaml": "PyYAML", "pydantic_core": "pydantic"}
 # Come with ROS: from its wheels (requirements.txt) or from a native installation.
 ROS = {
     "ament_index_python",

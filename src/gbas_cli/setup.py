@@ -20,6 +20,7 @@ setup(
         "gbas_core",
         "gbas_vdb",
         "gbas_msgs_py",
+        "gbas_node",
         "gbas_ground",
         "gbas_airborne",
         "gbas_sim",

@@ -21,7 +21,7 @@ from gbas_bringup.launcher import RunPlan
 from gbas_bringup.node_kinds import NODE_KINDS, NodeInstance
 from gbas_bringup.run_config import RunConfig
 from gbas_bringup.runs import execute
-from gbas_cli.replay import ReplayRequest, play
+from gbas_cli.replay import ReplayRequest, ReplayResult, play
 from gbas_msgs_py import topics
 
 PLAYER, RECORDER = (NodeInstance(kind=NODE_KINDS[name]) for name in ("player", "recorder"))
@@ -113,6 +113,26 @@ def test_comparison_finds_one_bit(fake_bag: Any, tmp_path: Path) -> None:
     assert results[topics.VDB].verdict() == "40 of 40 VDB bursts identical bit for bit"
 
 
+def test_tables_of_an_older_version_are_not_compared_and_said(fake_bag: Any, tmp_path: Path) -> None:
+    """They neither pass nor fail; what both versions write alike still counts."""
+    solution = topics.resolve(topics.AIRBORNE_SOLUTION)
+    recorded, replayed = fake_bag(), fake_bag()
+    old = [(key, data.replace(b"gbas/solution/2", b"gbas/solution/1")) for key, data in recorded.content[solution]]
+    recorded.content[solution] = old
+    recorded.write(tmp_path / "a")
+    replayed.write(tmp_path / "b")
+    found = compare(tmp_path / "a", tmp_path / "b")
+    results = {result.topic: result for result in found}
+    assert results[solution].verdict() == "40 solutions are gbas/solution/1, and gbas/solution/2 is made: not compared"
+    assert not results[solution].same
+    assert results[topics.VDB].verdict() == "40 of 40 VDB bursts identical bit for bit"
+    outcome = ReplayResult(bag=tmp_path / "a", replayed=tmp_path / "b", topics=tuple(found))
+    assert not outcome.identical
+    assert not outcome.differs
+    only_old = ReplayResult(bag=tmp_path / "a", replayed=tmp_path / "b", topics=(results[solution],))
+    assert only_old.differs
+
+
 def test_comparison_knows_padding_from_payload(fake_bag: Any, tmp_path: Path) -> None:
     """Some transports put up to three zero bytes behind a message."""
     padded = fake_bag()
@@ -183,9 +203,9 @@ def test_play_only_ends_by_itself(fake_bag: Any, tmp_path: Path, domain: int) ->
 @pytest.mark.parametrize(
     ("parameters", "words"),
     [
-        ((), "parameter 'bag' is ''"),
+        ((), "bag is missing (folder of a bag, or a .mcap file)"),
         (("bag:=/nowhere",), "/nowhere: there is no such bag"),
-        (("bag:=/nowhere", "mode:=some"), "parameter 'mode' is 'some'"),
+        (("bag:=/nowhere", "mode:=some"), "mode = 'some' is not one of 'inputs', 'all'"),
     ],
 )
 def test_bad_parameters_end_it_with_one_line(domain: int, parameters: tuple[str, ...], words: str) -> None:

@@ -261,10 +261,10 @@ def test_other_namespaces_and_named_topics_are_recorded(source: Source, recorder
 @pytest.mark.parametrize(
     ("parameters", "words"),
     [
-        (("chunk_bytes:=1",), "parameter 'chunk_bytes' is 1"),
+        (("chunk_bytes:=1",), "chunk_bytes = 1 is not within 1024 to 16777216 bytes"),
         (("colour:=red",), "parameter 'colour' is unknown"),
         (("config_files:=[/nowhere.yaml]",), "/nowhere.yaml: cannot be read"),
-        (("topics:=[weather]",), "parameter 'topics' is 'weather'"),
+        (("topics:=[weather]",), "topics = 'weather' is not an absolute name"),
         (("exclude:='['",), "a regular expression"),
     ],
 )

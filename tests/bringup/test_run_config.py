@@ -73,7 +73,7 @@ def test_player_takes_the_place_of_the_driver(tmp_path: Path) -> None:
         ("/gbas/positoning: {ros__parameters: {}}", "did you mean 'positioning'"),
         ("positioning: {ros__parameters: {}}", "its name must be /gbas/positioning"),
         ("/**:\n  ros__parameters:\n    a: [1, 2\n", "is not YAML: line 4, column 1"),
-        ("- 1\n- 2\n", "is no ROS parameter file"),
+        ("- 1\n- 2\n", "holds no sections of parameters"),
         ("/**: 3\n", "expected 'ros__parameters:' below it"),
         ("/**: {ros__parameters: {colour: red}}\n", "starts no node"),
         ("/**: {ros__parameters: 7}\n", "expected names and values"),

@@ -44,7 +44,8 @@ def bag(fake_bag: Any, tmp_path: Path) -> Path:
 @pytest.mark.parametrize(
     "command",
     [(), ("demo",), ("run",), ("launch-list",), ("process",), ("replay",), ("bench",), ("bag",), ("bag", "info"),
-     ("bag", "check"), ("bag", "recover"), ("vdb",), ("vdb", "decode"), ("vdb", "encode")],
+     ("bag", "check"), ("bag", "recover"), ("config",), ("config", "show"), ("config", "check"), ("config", "schema"),
+     ("vdb",), ("vdb", "decode"), ("vdb", "encode")],
 )  # fmt: skip
 def test_help_of_every_command(command: tuple[str, ...]) -> None:
     result = gbas(*command, "--help")

@@ -37,7 +37,7 @@ def random_record(schema: TableSchema[Any], seed: int, satellites: list[int], od
     rows = random_keys(schema, rng, len(satellites))
     for item, spec in columns_of(schema.record_type):
         if spec.row:
-            quantity = np.where(rng.random(len(satellites)) < 0.3, np.nan, rng.normal(size=len(satellites)) * odd)
+            quantity = rng.choice([rng.normal() * 1e7, np.nan, odd], size=len(satellites))
             coded = rng.choice(np.array(spec.codes or [0.0], dtype=np.float64), size=len(satellites))
             values[item.name] = rows.get(item.name, quantity if spec.codes is None else coded)
             continue

@@ -101,6 +101,7 @@ def test_live_nodes_give_the_bits_of_the_offline_chain(
     """At full speed, and paced with navigation files of the aircraft's own."""
     integrity, bursts = probe.listen(topics.GROUND_INTEGRITY), probe.bursts()
     monitors, channels = probe.listen(topics.GROUND_MONITORS), probe.listen(topics.GROUND_CHANNELS)
+    details = probe.listen(topics.GROUND_MONITOR_DETAILS)
     solutions, protections = probe.listen(topics.AIRBORNE_SOLUTION), probe.listen(topics.AIRBORNE_PROTECTION)
     events, fixes = probe.events(), probe.listen(topics.AIRBORNE_FIX, NavSatFix)
     scalars = {name: probe.listen(topic, Float64) for name, topic in SCALARS.items()}
@@ -122,6 +123,7 @@ def test_live_nodes_give_the_bits_of_the_offline_chain(
 
     assert raw(tables.INTEGRITY, integrity) == raw(tables.INTEGRITY, [each.integrity for each in ground])
     assert raw(tables.MONITORS, monitors) == raw(tables.MONITORS, [each.monitored.statistics for each in ground])
+    assert raw(tables.MONITOR_DETAILS, details) == raw(tables.MONITOR_DETAILS, [e.monitored.details for e in ground])
     assert raw(tables.CHANNELS, channels) == raw(tables.CHANNELS, [each.monitored.channels for each in ground])
     assert [b for b in bursts if b.bursts_in_frame] == [b for each in ground for b in each.bursts]
     assert raw(tables.SOLUTION, solutions) == raw(tables.SOLUTION, [each.solution for each in airborne])

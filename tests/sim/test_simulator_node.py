@@ -16,7 +16,7 @@ from bag_fixtures import isolated_domain  # noqa: E402
 from gbas_core.gnss.gpstime import epoch_key  # noqa: E402
 from gbas_core.gnss.observations import ObservationEpoch  # noqa: E402
 from gbas_msgs_py import tables, topics  # noqa: E402
-from gbas_node.node import GbasNode, NodeParams  # noqa: E402
+from gbas_node.node import GbasNode  # noqa: E402
 from gbas_sim.nodes.simulator import Simulator  # noqa: E402
 from gbas_sim.scenario import scenario_from_mapping  # noqa: E402
 from gbas_sim.world import World  # noqa: E402
@@ -44,7 +44,7 @@ class Collector(GbasNode):
     """Keeps what the simulator sends and reports progress as the chain's last node would."""
 
     def __init__(self, **kwargs):
-        super().__init__("collector", NodeParams, **kwargs)
+        super().__init__("collector", **kwargs)
         self.got = {}
         for topic, schema in (
             (topics.EPHEMERIS, tables.EPHEMERIS),

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, Final, Literal
 
 from rclpy.duration import Duration
 from rclpy.publisher import Publisher
@@ -23,11 +23,13 @@ from gbas_bags.capture import message_class
 from gbas_bags.mcap_scan import Message
 from gbas_bags.topic_names import contract_name, is_ephemeris, is_observation, is_progress, is_truth
 from gbas_core.errors import BagError
+from gbas_core.parameters import Parameter, ParameterError, parameters
 from gbas_msgs_py import topics
 from gbas_msgs_py.qos import qos_of
 from gbas_msgs_py.ros import qos_profile
-from gbas_node.driver import DriverNode, DriverParams
-from gbas_node.node import require, run
+from gbas_node.driver import DriverNode
+from gbas_node.node import run
+from gbas_node.params import DriverParams
 
 NODE_NAME: Final = "player"
 ACK_TIMEOUT_S: Final = 10.0
@@ -92,36 +94,34 @@ def by_epoch(messages: Iterator[Message], key_of: Callable[[Message], int | None
         yield waiting.pop(heapq.heappop(order))
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class PlayerParams(DriverParams):
-    """Parameters of the player beside those of every driver.
+    """Parameters of the player beside those of every driver."""
 
-    Attributes
-    ----------
-    bag : str
-        Folder or ``.mcap`` file.
-    mode : str
-        ``"inputs"`` or ``"all"``.
-    discovery_s : float
-        In mode ``all`` nobody is waited for by name: the time in which readers that are there are found [s].
-    """
-
-    bag: str = ""
-    mode: str = "inputs"
-    discovery_s: float = 1.0
+    bag: Annotated[str, Parameter("folder of a bag, or a .mcap file")]
+    mode: Annotated[
+        Literal["inputs", "all"], Parameter("what is sent: the inputs of the nodes, or everything recorded")
+    ] = "inputs"
+    discovery_s: Annotated[
+        float,
+        Parameter(
+            "in mode 'all' nobody is waited for by name: the time in which readers that are there are found",
+            "s", 0.0, 60.0,
+        ),
+    ] = 1.0  # fmt: skip
 
     def __post_init__(self) -> None:
-        super().__post_init__()
-        require("bag", self.bag, bool(self.bag), "a bag")
-        require("mode", self.mode, self.mode in ("inputs", "all"), "'inputs' or 'all'")
-        require("discovery_s", self.discovery_s, 0.0 <= self.discovery_s <= 60.0, "0 to 60 s")
+        if not self.bag:
+            raise ParameterError("bag = '' is not a bag")
 
 
 class Player(DriverNode[PlayedEpoch]):
     """Sends a bag."""
 
+    params_type = PlayerParams
+
     def __init__(self, **kwargs: Any) -> None:
-        super().__init__(NODE_NAME, PlayerParams, **kwargs)
+        super().__init__(NODE_NAME, **kwargs)
         self._path = Path(self.params.bag)
         self._made_s = self.now_s()
         self._inputs_only = self.params.mode == "inputs"

@@ -13,10 +13,9 @@ import re
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, Final, Literal
 
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
@@ -39,10 +38,12 @@ from gbas_bags.mcap_log import CHUNK_BYTES, FLUSH_PERIOD_S, BagWriter, Topic
 from gbas_bags.topic_names import contract_name, is_observation
 from gbas_core.errors import ConfigError
 from gbas_core.gnss.gpstime import from_epoch_key
+from gbas_core.parameters import Parameter, ParameterError, parameters
 from gbas_msgs_py import topics
 from gbas_msgs_py.qos import qos_of
 from gbas_msgs_py.tables import schema_dictionary
-from gbas_node.node import EXIT_FAILED, GbasNode, NodeParams, require, run
+from gbas_node.node import EXIT_FAILED, GbasNode, run
+from gbas_node.params import NodeParams
 
 NODE_NAME: Final = "recorder"
 SCHEMAS_METADATA: Final = "gbas.schemas"
@@ -56,53 +57,37 @@ _MAX_HELD: Final = 20_000
 _SHARED: Final = frozenset({topics.EVENTS, topics.DIAGNOSTICS, topics.SCHEMAS, "/rosout", "/parameter_events"})
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class RecorderParams(NodeParams):
-    """Parameters of the recorder.
+    """Parameters of the recorder."""
 
-    Attributes
-    ----------
-    out : str
-        Folder of the bag; must not exist, or be empty.
-    topics : tuple of str
-        Topics to record beside those of the suite, ``name`` or ``name:type``.
-    exclude : str
-        Regular expression of topics not to record; empty for none.
-    config_files : tuple of str
-        Configuration files whose text goes into the bag, the one that starts the nodes first.
-    command : str
-        Command line that started it all.
-    log_time : str
-        ``"data"``: messages are laid out along the data's time; ``"wall"``: along the time of reception.
-    flush_period_s : float
-        Longest time a message stays in this process [s].
-    chunk_bytes : int
-        Size at which a chunk is closed [bytes].
-    compression : str
-        ``"zstd"``, ``"lz4"`` or ``"none"``.
-    """
-
-    out: str = ""
-    topics: tuple[str, ...] = ()
-    exclude: str = ""
-    config_files: tuple[str, ...] = ()
-    command: str = ""
-    log_time: str = "data"
-    flush_period_s: float = FLUSH_PERIOD_S
-    chunk_bytes: int = CHUNK_BYTES
-    compression: str = "zstd"
+    out: Annotated[str, Parameter("folder of the bag; must not exist, or be empty")]
+    topics: Annotated[
+        tuple[str, ...], Parameter("topics to record beside those of the suite, 'name' or 'name:type'")
+    ] = ()
+    exclude: Annotated[str, Parameter("regular expression of topics not to record; empty for none")] = ""
+    config_files: Annotated[
+        tuple[str, ...],
+        Parameter("configuration files whose text goes into the bag, the one that starts the nodes first"),
+    ] = ()
+    command: Annotated[str, Parameter("command line that started it all")] = ""
+    log_time: Annotated[
+        Literal["data", "wall"],
+        Parameter("what messages are laid out along: the data's time, or the time of their reception"),
+    ] = "data"
+    flush_period_s: Annotated[float, Parameter("longest time a message stays in this process", "s", 0.05, 0.5)] = (
+        FLUSH_PERIOD_S
+    )
+    chunk_bytes: Annotated[int, Parameter("size at which a chunk is closed", "bytes", 1024, 1 << 24)] = CHUNK_BYTES
+    compression: Annotated[Literal["zstd", "lz4", "none"], Parameter("of the chunks")] = "zstd"
 
     def __post_init__(self) -> None:
-        super().__post_init__()
-        require("out", self.out, bool(self.out), "the folder of the bag")
-        require("log_time", self.log_time, self.log_time in ("data", "wall"), "'data' or 'wall'")
-        require("compression", self.compression, self.compression in ("zstd", "lz4", "none"), "zstd, lz4 or none")
-        require("flush_period_s", self.flush_period_s, 0.05 <= self.flush_period_s <= 0.5, "0.05 to 0.5 s")
-        require("chunk_bytes", self.chunk_bytes, 1024 <= self.chunk_bytes <= 1 << 24, "1024 to 16777216 bytes")
+        if not self.out:
+            raise ParameterError("out = '' is not the folder of the bag")
         try:
             re.compile(self.exclude)
         except re.error as error:
-            require("exclude", self.exclude, False, f"a regular expression ({error})")
+            raise ParameterError(f"exclude = {self.exclude!r} is not a regular expression ({error})") from None
 
 
 def suite_metadata(command: str, config_files: Sequence[str]) -> dict[str, dict[str, str]]:
@@ -212,8 +197,10 @@ class Recording:
 class Recorder(GbasNode):
     """Records the topics of the suite, of every namespace below ``/gbas``, and what else it is told to."""
 
+    params_type = RecorderParams
+
     def __init__(self, **kwargs: Any) -> None:
-        super().__init__(NODE_NAME, RecorderParams, **kwargs)
+        super().__init__(NODE_NAME, **kwargs)
         self.check_overrides()  # before there is a bag
         params: RecorderParams = self.params
         metadata = suite_metadata(params.command or " ".join(sys.argv), params.config_files)
@@ -351,7 +338,8 @@ class Recorder(GbasNode):
 
 def _wanted(entry: str) -> tuple[str, str | None]:
     name, _, msgtype = entry.partition(":")
-    require("topics", entry, name.startswith("/"), "absolute names, '/name' or '/name:package/msg/Type'")
+    if not name.startswith("/"):
+        raise ParameterError(f"topics = {entry!r} is not an absolute name, '/name' or '/name:package/msg/Type'")
     return name, msgtype or None
 
 

@@ -3,35 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 from gbas_bench.world import crowded
-from gbas_node.node import require, run
+from gbas_core.parameters import Parameter, ParameterError, parameters
+from gbas_node.node import run
 from gbas_node.pacing import Playback
 from gbas_sim.nodes.simulator import Simulator, SimulatorParams
 from gbas_sim.world import SimulatedEpoch, World
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class BenchSourceParams(SimulatorParams):
-    """Parameters of the source.
+    """Parameters of the source."""
 
-    Attributes
-    ----------
-    epochs : int
-        How many are sent.
-    ahead_epochs : int
-        So many of the first are sent as fast as the readers take them, to settle the filters.
-    """
-
-    epochs: int = 100
-    ahead_epochs: int = 0
+    epochs: Annotated[int, Parameter("how many are sent", "epochs", 1, 4000)] = 100
+    ahead_epochs: Annotated[
+        int,
+        Parameter(
+            "so many of the first are sent as fast as the readers take them, to settle the filters", "epochs", 0, 4000
+        ),
+    ] = 0
 
     def __post_init__(self) -> None:
-        super().__post_init__()
-        require("epochs", self.epochs, 1 <= self.epochs <= 4000, "1 to 4000")
-        require("ahead_epochs", self.ahead_epochs, 0 <= self.ahead_epochs <= self.epochs, "0 to epochs")
+        if self.ahead_epochs > self.epochs:
+            raise ParameterError(f"ahead_epochs = {self.ahead_epochs} is more than epochs = {self.epochs}")
 
 
 class BenchSource(Simulator):

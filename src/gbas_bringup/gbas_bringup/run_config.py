@@ -21,12 +21,15 @@ from typing import Any, Final
 import yaml
 
 from gbas_bringup.node_kinds import NODE_KINDS, NodeInstance, Stage
+from gbas_core.configuration import Configuration, read_configuration
 from gbas_core.errors import ConfigError
+from gbas_core.parameters import ParameterError
 from gbas_msgs_py.topics import DEFAULT_NAMESPACE
-from gbas_sim.scenario import ScenarioError, read_document
 
 _PARAMETERS: Final = "ros__parameters"
 _ALL: Final = "/**"
+MODELINE: Final = "# yaml-language-server:"
+"""Begin of the comment that tells editors the schema of a file."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,12 +101,13 @@ def read_run_config(path: Path) -> RunConfig:
     ConfigError
         When it cannot be read, is not a ROS parameter file, names an unknown node, or has not one driver of time.
     """
-    document = _load(path)
+    configuration = _read(path)
+    _, document = configuration.layers[0]
     whole = ""
-    if "base" in document:
-        document = _with_base(path)
+    if len(configuration.layers) > 1:
+        document = configuration.content()
         whole = _heading(path) + yaml.safe_dump(document, sort_keys=False, width=120)
-    parameters = dict(_sections(document, path))
+    parameters = dict(named_sections(document, path))
     nodes = {node.full_name: node for node in _named(parameters, path)}
     for node in _implied(parameters, has_driver=any(n.kind.stage is Stage.DRIVER for n in nodes.values())):
         if not any(known.kind == node.kind for known in nodes.values()):
@@ -130,43 +134,23 @@ def one_driver(config: RunConfig) -> NodeInstance:
     return config.drivers[0]
 
 
-def _load(path: Path) -> Mapping[str, Any]:
+def _read(path: Path) -> Configuration:
     try:
-        document = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ConfigError(path, f"cannot be read: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise ConfigError(path, "is not a text file") from error
-    except yaml.YAMLError as error:
-        raise ConfigError(path, f"is not YAML: {_one_line(error)}") from error
-    if not isinstance(document, Mapping):
-        raise ConfigError(path, f"is no ROS parameter file: a {type(document).__name__}, expected node names")
-    return document
-
-
-def _with_base(path: Path) -> Mapping[str, Any]:
-    try:
-        document, _ = read_document(path)
-    except ScenarioError as error:
-        raise ConfigError(path, str(error).removeprefix(f"{path}: ")) from error
-    if not isinstance(document, Mapping):
-        raise ConfigError(path, "is not based on a ROS parameter file")
-    return document
+        return read_configuration(path)
+    except ParameterError as error:
+        raise ConfigError(path, str(error).removeprefix(f"{path}: ")) from None
 
 
 def _heading(path: Path) -> str:
     """Comment at the head of a configuration file, and where it comes from."""
     head = itertools.takewhile(lambda line: line.startswith("#"), path.read_text(encoding="utf-8").splitlines())
-    return "\n".join([*head, f"# Written from {path.name} and what it is based on."]) + "\n"
+    kept = [line for line in head if not line.startswith(MODELINE)]  # the schema is not beside the file that is written
+    return "\n".join([*kept, f"# Written from {path.name} and what it is based on."]) + "\n"
 
 
-def _one_line(error: yaml.YAMLError) -> str:
-    mark = getattr(error, "problem_mark", None)
-    where = f"line {mark.line + 1}, column {mark.column + 1}: " if mark is not None else ""
-    return f"{where}{getattr(error, 'problem', None) or error}".replace("\n", " ")
-
-
-def _sections(document: Mapping[str, Any], path: Path, prefix: str = "") -> Iterator[tuple[str, Mapping[str, Any]]]:
+def named_sections(
+    document: Mapping[str, Any], path: Path, prefix: str = ""
+) -> Iterator[tuple[str, Mapping[str, Any]]]:
     """Full node name and parameters of each section; namespaces may be written as levels of their own."""
     for key, value in document.items():
         name = f"{prefix}/{str(key).strip('/')}"
@@ -178,7 +162,7 @@ def _sections(document: Mapping[str, Any], path: Path, prefix: str = "") -> Iter
                 raise ConfigError(path, f"is {parameters!r}, expected names and values", f"{key}.{_PARAMETERS}")
             yield name, parameters
         else:
-            yield from _sections(value, path, name)
+            yield from named_sections(value, path, name)
 
 
 def _named(parameters: Mapping[str, Any], path: Path) -> Iterator[NodeInstance]:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from gbas_airborne.params import AirborneParams
+from gbas_airborne.params import AirborneParams, airborne_section
 from gbas_bringup.resources import config_path
 from gbas_chain.chain import AirborneOutput, Chain
 from gbas_chain.results import Row, summarise, write_json, write_solution_csv
@@ -156,10 +156,7 @@ def prepare(request: ProcessRequest) -> Prepared:
     ground_source, sections = _ground_sections(request, recording, notes)
     ground = GroundParams.from_mapping(sections, source=ground_source)
     airborne_values = _airborne_values(request, recording, ground)
-    try:
-        airborne = AirborneParams.from_mapping(airborne_values)
-    except ValueError as error:
-        raise ConfigError(request.airborne or "gbas process", str(error)) from None
+    airborne = AirborneParams.from_mapping(airborne_values, source=str(request.airborne or "gbas process"))
     return Prepared(
         recording=recording,
         ground=ground,
@@ -326,9 +323,7 @@ def _fas(path: Path) -> Mapping[str, Any]:
 
 def _airborne_values(request: ProcessRequest, recording: Recording, ground: GroundParams) -> dict[str, Any]:
     """Values of the receiver's configuration."""
-    document = {} if request.airborne is None else _document(request.airborne) or {}
-    for key in ("/**", "ros__parameters", "airborne"):
-        document = document.get(key, document)
+    given = {} if request.airborne is None else airborne_section(request.airborne)
     assert recording.user is not None
     interval_s = max(file.interval_s or 0.0 for file in recording.ground)
     values: dict[str, Any] = {
@@ -340,4 +335,4 @@ def _airborne_values(request: ProcessRequest, recording: Recording, ground: Grou
     }
     if ground.approaches:
         values["rpds"] = ground.approaches[0].rpds
-    return {**values, **document}
+    return {**values, **given}

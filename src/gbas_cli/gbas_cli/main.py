@@ -16,6 +16,7 @@ from typing import Annotated, Any
 import typer
 
 from gbas_bringup import __version__
+from gbas_cli import config as cli_config
 from gbas_cli import reproduce as cli_reproduce
 from gbas_cli import siting as cli_siting
 from gbas_cli import study as cli_study
@@ -49,6 +50,7 @@ bag_app = typer.Typer(help="Look into recorded bags, check them, save damaged on
 vdb_app = typer.Typer(help="Messages of the VHF data broadcast: bits to values and back.", no_args_is_help=True)
 sim_app = typer.Typer(help="Simulated worlds as files.", no_args_is_help=True)
 app.add_typer(bag_app, name="bag")
+app.add_typer(cli_config.app, name="config")
 app.add_typer(sim_app, name="sim")
 app.add_typer(vdb_app, name="vdb")
 cli_reproduce.register(app)

@@ -143,8 +143,12 @@ class Parameter:
         """Bounds and unit in words."""
         unit = "" if self.unit == "-" else f" {self.unit}"
         if self.high is None:
-            return f"{self.low:g}{unit} or more"
-        return f"within {self.low:g} to {self.high:g}{unit}" if self.low is not None else f"{self.high:g}{unit} or less"
+            return f"{self.low:.8g}{unit} or more"
+        return (
+            f"within {self.low:.8g} to {self.high:.8g}{unit}"
+            if self.low is not None
+            else f"{self.high:.8g}{unit} or less"
+        )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -425,8 +429,8 @@ def _bounded(schema: dict[str, Any], low: float | None, high: float | None) -> d
 
 
 def _explained(kind: type[Any], error: ValidationError, section: str = "") -> ParameterError:
-    """The first thing that is wrong, in the words of a file."""
-    found = error.errors(include_url=False)[0]
+    """The first thing that is wrong, in the words of a file; what is missing comes after what is there and wrong."""
+    found = min(error.errors(include_url=False), key=_is_missing)
     path = tuple(str(each) for each in found["loc"] if isinstance(each, str))
     key = ".".join((*([section] if section else []), *(file_key(each) for each in path)))
     reason, value = found["type"], found["input"]
@@ -444,6 +448,10 @@ def _explained(kind: type[Any], error: ValidationError, section: str = "") -> Pa
     if reason == "literal_error":
         return ParameterError(f"{key} = {value!r} is not one of {found['ctx']['expected'].replace(' or ', ', ')}")
     return ParameterError(f"{key} = {value!r} {_KINDS.get(reason, found['msg'])}")
+
+
+def _is_missing(problem: Mapping[str, Any]) -> bool:
+    return problem["type"] in _MISSING and not isinstance(problem["loc"][-1], int)
 
 
 def _missing(hint: Any, key: str) -> str:
@@ -507,48 +515,8 @@ def _classes(hint: Any) -> Iterator[Any]:
 
 # --- until every set of parameters is declared as above
 
-_OLD_KINDS: Final = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
-
 
 def require(name: str, value: object, condition: bool, expected: str) -> None:
     """Raise ParameterError unless `condition` holds."""
     if not condition:
         raise ParameterError(f"parameter '{name}' is {value!r}, expected {expected}")
-
-
-def parameters_from(params_type: type[P], values: Mapping[str, Any]) -> P:
-    """An instance of `params_type` with `values` over its defaults.
-
-    Raises
-    ------
-    ParameterError
-        For a name that is not a field, or a value of another type (an integer will do for a float), or whatever the
-        dataclass itself refuses.
-    """
-    types = field_types(params_type)
-    unknown_parameters(values, types)
-    return params_type(**{name: _coerced(name, value, types[name]) for name, value in values.items()})
-
-
-def field_types(params_type: type[Any]) -> dict[str, Any]:
-    """Name and type of each field."""
-    hints = typing.get_type_hints(params_type)
-    return {item.name: hints[item.name] for item in dataclasses.fields(params_type)}
-
-
-def _coerced(name: str, value: Any, kind: Any) -> Any:
-    if kind is float and type(value) is int:
-        return float(value)
-    if typing.get_origin(kind) is tuple:
-        return _coerced_tuple(name, value, typing.get_args(kind)[0])
-    require(name, value, type(value) is kind, _OLD_KINDS[kind])
-    return value
-
-
-def _coerced_tuple(name: str, value: Any, kind: Any) -> tuple[Any, ...]:
-    # An empty ROS array has no type of its own; [""] is the ROS way to write an empty list of strings.
-    if value is None or (kind is str and value in ([""], [b""], ("",))):
-        return ()
-    iterable = hasattr(value, "__iter__") and not isinstance(value, str | bytes)
-    require(name, value, iterable, "a list")
-    return tuple(_coerced(name, each, kind) for each in value)

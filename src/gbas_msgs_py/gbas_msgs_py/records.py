@@ -114,9 +114,10 @@ class MonitorEpoch(Record):
 
     def check(self) -> None:
         """Refuse a test that its monitor does not have."""
-        for monitor, test in set(zip(self.monitor.tolist(), self.test.tolist(), strict=True)):
-            if (monitor, test) not in TESTS:
-                raise ValueError(f"monitor {monitor:g} has no test {test:g}")
+        unknown = set(zip(self.monitor.tolist(), self.test.tolist(), strict=True)).difference(TESTS)
+        if unknown:
+            monitor, test = min(unknown)
+            raise ValueError(f"monitor {monitor:g} has no test {test:g}")
 
     def __len__(self) -> int:
         return len(self.monitor)

@@ -51,9 +51,16 @@ class RowLayout:
     def __init__(self, identifier: str, specs: tuple[ColumnSpec, ...]) -> None:
         self._identifier = identifier
         self.names = tuple(spec.names[0] for spec in specs)
-        self._codes = [(place, spec.codes) for place, spec in enumerate(specs) if spec.codes is not None]
-        self._known = [np.isin(np.arange(max(codes) + 1), codes) for _, codes in self._codes]
-        self._key = [place for place, spec in enumerate(specs) if spec.key]
+        coded = [(place, spec.codes) for place, spec in enumerate(specs) if spec.codes is not None]
+        self._coded = np.array([place for place, _ in coded], dtype=np.int64)
+        self._sizes = np.array([max(codes) + 1 for _, codes in coded], dtype=np.int64)
+        self._known = np.zeros((len(coded), int(self._sizes.max(initial=0)) + 1), dtype=bool)
+        for row, (_, codes) in enumerate(coded):
+            self._known[row, list(codes)] = True
+        key = np.array([specs[place].key for place, _ in coded], dtype=bool)
+        # A key is one number: its codes as digits, each of its own base.
+        bases = np.where(key, self._sizes, 1)
+        self._weights = np.where(key, np.cumprod(bases) // np.maximum(bases, 1), 0)
 
     def block(self, record: Record) -> FloatArray:
         """The rows of a record, ``(rows, columns)``."""
@@ -65,21 +72,21 @@ class RowLayout:
 
     def check(self, block: FloatArray) -> None:
         """Refuse unknown codes and rows about the same."""
-        for (place, _), known in zip(self._codes, self._known, strict=True):
-            values = block[:, place]
-            inside = (values >= 0) & (values < len(known))
-            numbers = np.where(inside, values, 0.0).astype(np.int64)
-            bad = ~inside | (numbers != values) | ~known[numbers]
-            if bad.any():
-                raise SchemaError(f"{self._identifier}: {self.names[place]} {values[bad][0]:g} is not a known code")
-        keys = block[:, self._key]
-        if len(keys) > 1 and self._key:
-            ordered = keys[np.lexsort(keys.T)]
-            same = (ordered[1:] == ordered[:-1]).all(axis=1)
-            if same.any():
-                row = ordered[:-1][same][0]
-                what = ", ".join(f"{self.names[at]} {value:g}" for at, value in zip(self._key, row, strict=True))
-                raise SchemaError(f"{self._identifier}: more than one row with {what}")
+        values = block[:, self._coded]
+        inside = (values >= 0.0) & (values < self._sizes)
+        numbers = np.where(inside, values, 0.0).astype(np.int64)
+        good = inside & (numbers == values) & self._known[np.arange(len(self._coded)), numbers]
+        if not good.all():
+            row, place = np.argwhere(~good)[0]
+            name = self.names[self._coded[place]]
+            raise SchemaError(f"{self._identifier}: {name} {values[row, place]:g} is not a known code")
+        keys = np.sort(numbers @ self._weights) if self._weights.any() else np.arange(len(numbers))
+        same = keys[1:] == keys[:-1]
+        if same.any():
+            row = int(np.flatnonzero(numbers @ self._weights == keys[1:][same][0])[0])
+            digits = [place for place, weight in enumerate(self._weights) if weight]
+            what = ", ".join(f"{self.names[self._coded[place]]} {numbers[row, place]}" for place in digits)
+            raise SchemaError(f"{self._identifier}: more than one row with {what}")
 
 
 class TableSchema(Generic[R]):

@@ -7,9 +7,8 @@ readers have finished with the last, says so in a ``finished`` event, and ends w
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from functools import partial
-from typing import Any, Final, Generic, Protocol, TypeVar
+from typing import Any, ClassVar, Final, Generic, Protocol, TypeVar
 
 from gbas_core.gnss.ephemeris import Ephemeris
 from gbas_core.gnss.gpstime import epoch_key, from_epoch_key
@@ -17,44 +16,12 @@ from gbas_msgs_py.codes import EventKind
 from gbas_msgs_py.events import Event
 from gbas_msgs_py.joining import ReceptionQueue
 from gbas_msgs_py.tables import EPHEMERIS, ProgressEpoch
-from gbas_node.node import STATUS_OK, STATUS_STALE, GbasNode, NodeParams, require
+from gbas_node.node import STATUS_OK, STATUS_STALE, GbasNode
 from gbas_node.pacing import Pacer, Playback
+from gbas_node.params import DriverParams
 
 _AT_ONCE_S = 0.0
 _WHILE_WAITING_S = 0.01
-
-
-@dataclass(frozen=True, kw_only=True)
-class DriverParams(NodeParams):
-    """Parameters every driver has.
-
-    Attributes
-    ----------
-    speed : float
-        Multiple of real time; 0 for as fast as the readers go.
-    window_epochs : int
-        Most epochs sent that some reader has not finished with. With more of them each node does several at a time (16
-        are up to half as fast again as 8); above 16, the depth of its queue, ``/clock`` may lose messages.
-    wait_for : tuple of str
-        Readers that report on every epoch with airborne observations: node names, or full names of progress topics.
-    wait_for_ground : tuple of str
-        Readers that report on every epoch.
-    stall_s : float
-        Give up when no reader makes progress for this long [s].
-    """
-
-    start_wait_s: float = 20.0
-    speed: float = 1.0
-    window_epochs: int = 16
-    wait_for: tuple[str, ...] = ("protection_level",)
-    wait_for_ground: tuple[str, ...] = ("correction_broadcast",)
-    stall_s: float = 60.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        require("speed", self.speed, 0.0 <= self.speed <= 1e6, "0 (as fast as the readers go) to 1e6")
-        require("window_epochs", self.window_epochs, 1 <= self.window_epochs <= 100, "1 to 100")
-        require("stall_s", self.stall_s, 0.0 < self.stall_s <= 3600.0, "more than 0, up to 3600 s")
 
 
 class DrivenEpoch(Protocol):
@@ -102,8 +69,10 @@ class EphemerisFeed:
 class DriverNode(GbasNode, Generic[E]):
     """A node that drives time; subclasses make the epochs and send them."""
 
-    def __init__(self, name: str, params_type: type[DriverParams], **kwargs: Any) -> None:
-        super().__init__(name, params_type, **kwargs)
+    params_type: ClassVar[type[Any]] = DriverParams
+
+    def __init__(self, name: str, **kwargs: Any) -> None:
+        super().__init__(name, **kwargs)
         self.readers = (*self.params.wait_for_ground, *(self.params.wait_for if self.flies() else ()))
         self.pacer = Pacer(self.params.window_epochs, self.readers)
         self._playback = Playback(self.params.speed)

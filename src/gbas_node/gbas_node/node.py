@@ -2,8 +2,8 @@
 
 A node decodes, calls one step, encodes; everything that every node does is here:
 
-- Parameters come from a frozen dataclass. Unknown names, wrong types and values out of bounds end the program with one
-  line and exit code 2.
+- Parameters are those of the class in ``params_type`` (:mod:`gbas_core.parameters`). Unknown names, wrong types and
+  values out of bounds end the program with one line and exit code 2.
 - A message that cannot be decoded is dropped, counted and reported in ``/diagnostics``; the node goes on.
 - The first epoch is held back until every output has its readers, so a chain of processes loses nothing at its start.
 - SIGINT and SIGTERM let the node publish what is pending; the exit code is then 0.
@@ -13,7 +13,6 @@ Programs that run nodes must be started as console scripts or with ``python -m``
 
 from __future__ import annotations
 
-import dataclasses
 import os
 import signal
 import sys
@@ -21,8 +20,7 @@ import threading
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
-from typing import Any, Final, Generic, TypeVar
+from typing import Any, ClassVar, Final, Generic, TypeVar
 
 import rclpy
 import rclpy.utilities
@@ -38,7 +36,7 @@ from std_msgs.msg import Float64, Float64MultiArray, String, UInt8, UInt8MultiAr
 
 from gbas_core.gnss.ephemeris import Ephemeris
 from gbas_core.gnss.gpstime import epoch_key
-from gbas_core.parameters import ParameterError, field_types, parameters_from, require, unknown_parameters
+from gbas_core.parameters import declared, file_key, from_mapping, unknown_parameters
 from gbas_core.record import Record
 from gbas_msgs_py import cdr, ros, topics
 from gbas_msgs_py.cdr import TableCodec
@@ -47,6 +45,8 @@ from gbas_msgs_py.joining import ReceptionQueue
 from gbas_msgs_py.qos import qos_of
 from gbas_msgs_py.schema import SchemaError, TableSchema
 from gbas_msgs_py.tables import EPHEMERIS, PROGRESS, ProgressEpoch
+from gbas_node.descriptors import descriptor_of
+from gbas_node.params import NodeParams
 from gbas_node.transport import use_profile
 from gbas_vdb.transmission.burst import Burst
 
@@ -72,60 +72,6 @@ SECTIONS: Final = ("ground", "airborne", "sim", "qos_overrides")
 """First words of dotted parameters that belong to a part of the suite; one file may hold them for all nodes."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class NodeParams:
-    """Parameters every node has.
-
-    Attributes
-    ----------
-    start_wait_s : float
-        The first epoch is held until every output has its readers and every input was heard, at most this long [s].
-    recorders : int
-        Readers on each output beside those of the chain, such as a recorder, that are waited for at the start.
-    silence_s : float
-        After this long without input the node reports an error in its diagnostics [s].
-    """
-
-    start_wait_s: float = 10.0
-    recorders: int = 0
-    silence_s: float = 3.0
-
-    def __post_init__(self) -> None:
-        require("start_wait_s", self.start_wait_s, 0.0 <= self.start_wait_s <= 3600.0, "0 to 3600 s")
-        require("recorders", self.recorders, 0 <= self.recorders <= 100, "0 to 100")
-        require("silence_s", self.silence_s, 0.0 < self.silence_s <= 3600.0, "more than 0, up to 3600 s")
-
-
-@dataclass(frozen=True, kw_only=True)
-class ConfiguredParams(NodeParams):
-    """Parameters of a node whose subject is configured in a file and in ROS parameters over it.
-
-    Attributes
-    ----------
-    config : str
-        The file; none when everything is in ROS parameters.
-    """
-
-    config: str = ""
-
-
-@dataclass(frozen=True, kw_only=True)
-class JoiningParams(ConfiguredParams):
-    """Parameters of a node that joins several inputs by epoch.
-
-    Attributes
-    ----------
-    join_timeout_s : float
-        An epoch is processed without what is still missing this long after its first part arrived [s].
-    """
-
-    join_timeout_s: float = 1.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        require("join_timeout_s", self.join_timeout_s, 0.0 < self.join_timeout_s <= 3600.0, "more than 0, up to 3600 s")
-
-
 class TablePublisher(Generic[R]):
     """Publishes records of one schema."""
 
@@ -149,16 +95,21 @@ class GbasNode(Node):
     ----------
     name : str
         Default node name.
-    params_type : type
-        Frozen dataclass derived from :class:`NodeParams`.
     **kwargs
         Passed to :class:`rclpy.node.Node`; the namespace is ``/gbas`` unless given.
+
+    Attributes
+    ----------
+    params_type : type
+        Class of the node's own parameters.
     """
 
-    def __init__(self, name: str, params_type: type[NodeParams], **kwargs: Any) -> None:
+    params_type: ClassVar[type[Any]] = NodeParams
+
+    def __init__(self, name: str, **kwargs: Any) -> None:
         kwargs.setdefault("namespace", topics.DEFAULT_NAMESPACE)
         super().__init__(name, **kwargs)
-        self.params: Any = self._declare(params_type)
+        self.params: Any = self._own_params()
         self.activity = 0
         self.exit_code: int | None = None
         self.processed = 0
@@ -182,24 +133,30 @@ class GbasNode(Node):
 
     def overrides(self, prefix: str = "") -> dict[str, Any]:
         """Parameter values given from outside whose names start with `prefix`, by the rest of their names."""
-        given = {name: p.value for name, p in self._parameter_overrides.items() if name.startswith(prefix)}
-        return {name[len(prefix) :]: list(v) if hasattr(v, "typecode") else v for name, v in given.items()}
+        given = self._parameter_overrides.items()
+        return {name[len(prefix) :]: _plain(each.value) for name, each in given if name.startswith(prefix)}
 
-    def _declare(self, params_type: type[NodeParams]) -> NodeParams:
-        known = field_types(params_type)
-        given = self.overrides()
-        params = parameters_from(params_type, {name: value for name, value in given.items() if name in known})
-        for item in dataclasses.fields(params):
-            value = getattr(params, item.name)
-            self.declare_read_only(item.name, value, str(item.type))
+    def _own_params(self) -> NodeParams:
+        known = {file_key(name) for name in self.params_type.__dataclass_fields__}
+        given = {name: value for name, value in self.overrides().items() if name in known}
+        params: NodeParams = from_mapping(self.params_type, given)
+        self.show_parameters(params)
         return params
 
-    def declare_read_only(self, name: str, value: Any, description: str) -> None:
-        """Show a parameter's value to ROS; values given from outside have been taken already."""
-        descriptor = ParameterDescriptor(description=description, read_only=True, dynamic_typing=True)
+    def show_parameters(self, params: Any, prefix: str = "") -> None:
+        """Show a set of parameters to ROS, read-only: values given from outside have been taken already."""
+        for each in declared(params, prefix):
+            if each.value is None:  # left out
+                continue
+            self.declare_read_only(each.key, each.value, descriptor_of(each))
+
+    def declare_read_only(self, name: str, value: Any, about: str | ParameterDescriptor) -> None:
+        """Show one parameter; `about` is its descriptor, or what it means."""
+        if isinstance(about, str):
+            about = ParameterDescriptor(description=about, read_only=True, dynamic_typing=True)
         if isinstance(value, tuple):
             value = list(value) or [""]
-        self.declare_parameter(name, value, descriptor, ignore_override=True)
+        self.declare_parameter(name, value, about, ignore_override=True)
 
     def check_overrides(self) -> None:
         """Refuse parameters that nothing in this node has declared; the end of the start."""
@@ -502,6 +459,11 @@ class GbasNode(Node):
         return STATUS_OK, "running"
 
 
+def _plain(value: Any) -> Any:
+    """A ROS parameter's value; an empty list has no type in ROS, and comes as none."""
+    return list(value) if hasattr(value, "typecode") else [] if value is None else value
+
+
 def run(factories: Factory | Sequence[Factory], args: Sequence[str] | None = None) -> None:
     """Run one node, or several in one process, until a signal or until one of them ends; then exit.
 
@@ -608,6 +570,3 @@ class _Signals:
             os._exit(EXIT_OK if self.wake is None else 130)
         self.stop.set()
         self.wake()
-
-
-__all__ = ["GbasNode", "NodeParams", "ParameterError", "TablePublisher", "require", "run", "serve"]

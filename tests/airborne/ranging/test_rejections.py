@@ -291,7 +291,7 @@ def test_within_d_max() -> None:
 def test_below_the_mask() -> None:
     """A mask at the aircraft above the world's: what lies between goes, with its elevation in the event."""
     world = World()
-    flight = flown(world, replace(PARAMS, elevation_mask_deg=20.0))
+    flight = flown(world, replace(PARAMS, elevation_mask_rad=math.radians(20.0)))
     solution = flight.solutions[-1]
     low = [index for index in world.satellites if index not in used(flight)]
     assert low

@@ -510,6 +510,6 @@ def test_more_satellites_than_one_message_holds() -> None:
     world = World(mask_rad=math.radians(5.0))
     world.satellites = [*world.satellites, *[s for s in range(24) if s not in world.satellites]][:22]
     assert len(world.type1(0.0)) == 2
-    flight = Flight(world, AirborneParams(settle_s=2.0, elevation_mask_deg=5.0))
+    flight = Flight(world, AirborneParams(settle_s=2.0, elevation_mask_rad=math.radians(5.0)))
     flight.run(0.0, 3.0)
     assert np.isfinite(flight.state.position.reception.vdb.corrections["l1_100"].listed).sum() == 22

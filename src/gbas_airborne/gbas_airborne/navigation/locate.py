@@ -158,7 +158,10 @@ def _evidence(
         Rejection.EPHEMERIS_CRC_MISMATCH: (sources.own_crc[index], received.checks.crc[index]),
         Rejection.NOT_SETTLED: (sources.settled_s[index], params.settle_s),
         Rejection.DISTANCE: (result.geometry.distance_m, station.d_max_m),
-        Rejection.ELEVATION: (math.degrees(result.geometry.elevation_rad[index]), params.elevation_mask_deg),
+        Rejection.ELEVATION: (
+            math.degrees(result.geometry.elevation_rad[index]),
+            math.degrees(params.elevation_mask_rad),
+        ),
         Rejection.RANGE_TEST: (result.range_error_m[index], params.range_test_floor_m),
     }
     about_ephemeris = Rejection.EPHEMERIS_IOD <= reason <= Rejection.EPHEMERIS_CRC_MISMATCH

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Final, Literal, cast
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -224,10 +224,11 @@ def _geometry(inputs: PositionInputs, position: FloatArray, params: AirbornePara
     baseline = position - station.reference_ecef_m
     distance = float(np.sqrt(baseline @ baseline))
     height_above = float(height) - station.reference_height_m
-    mask = math.radians(params.elevation_mask_deg)
+    mask = params.elevation_mask_rad
     speed_mps = inputs.prior.speed_mps(position, rot_enu[2], params.max_speed_mps)
-    aad = cast(Literal["A", "B"], params.aad)
-    noise = np.hypot(sigma_noise_air(aad, elevation, mask_rad=mask), sigma_multipath_air(elevation, mask_rad=mask))
+    noise = np.hypot(
+        sigma_noise_air(params.aad, elevation, mask_rad=mask), sigma_multipath_air(elevation, mask_rad=mask)
+    )
     air = noise * sources.noise_factor
     scale = station.scale_height_m
     tropo = tropo_correction_m(station.refractivity, scale, elevation, height_above, mask_rad=mask)
@@ -257,7 +258,7 @@ def _reasons(inputs: PositionInputs, geometry: Geometry, params: AirborneParams)
     candidate = reason == int(Rejection.NONE)
     if not geometry.distance_m <= inputs.station.d_max_m:
         return np.where(candidate, int(Rejection.DISTANCE), reason)
-    low = candidate & (geometry.elevation_rad < math.radians(params.elevation_mask_deg))
+    low = candidate & (geometry.elevation_rad < params.elevation_mask_rad)
     without = ~np.isfinite(geometry.sigma_m + geometry.tropo_m + inputs.sources.range_m) | ~(geometry.sigma_m > 0.0)
     reason = np.where(candidate & without, int(Rejection.SIGMA), reason)
     return np.where(low, int(Rejection.ELEVATION), reason)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, fields
 from typing import Any
 
-from gbas_airborne.params import AirborneParams
-from gbas_core.parameters import ParameterError
+from gbas_airborne.params import SECTION, AirborneParams, airborne_section
+from gbas_core.parameters import merged, nested
 from gbas_node.node import GbasNode
 
-PREFIX = "airborne."
+PREFIX = f"{SECTION}."
 
 
 def receiver_params(node: GbasNode, config: str) -> AirborneParams:
@@ -17,15 +16,11 @@ def receiver_params(node: GbasNode, config: str) -> AirborneParams:
 
     Raises
     ------
-    ValueError
+    ParameterError
         Naming the file, the parameter, its value and its bound.
     """
-    given: dict[str, Any] = {} if not config else asdict(AirborneParams.from_yaml(config))
-    overrides = node.overrides(PREFIX)
-    try:
-        receiver = AirborneParams.from_mapping({**given, **overrides})
-    except ValueError as error:
-        raise ParameterError(f"{config or 'ROS parameters'}: {error}") from None
-    for item in fields(receiver):
-        node.declare_read_only(PREFIX + item.name, getattr(receiver, item.name), str(item.type))
+    given: dict[str, Any] = airborne_section(config) if config else {}
+    values = merged(nested(given), nested(node.overrides(PREFIX)))
+    receiver = AirborneParams.from_mapping(values, source=config or "ROS parameters")
+    node.show_parameters(receiver, PREFIX)
     return receiver

@@ -13,15 +13,18 @@ from gbas_core.gnss.gpstime import epoch_key, from_epoch_key
 from gbas_core.gnss.observations import ObservationEpoch
 from gbas_msgs_py import tables, topics
 from gbas_msgs_py.joining import AirborneInput, AirborneJoiner
-from gbas_node.node import GbasNode, JoiningParams, run
+from gbas_node.node import GbasNode, run
+from gbas_node.params import JoiningParams
 from gbas_vdb.transmission.burst import Burst
 
 
 class Positioning(GbasNode):
     """Joins observations with bursts and runs :meth:`AirborneReceiver.position`."""
 
+    params_type = JoiningParams
+
     def __init__(self, **kwargs: Any) -> None:
-        super().__init__("positioning", JoiningParams, **kwargs)
+        super().__init__("positioning", **kwargs)
         self.receiver = receiver_params(self, self.params.config)
         self.state = PositionState()
         self.joiner: AirborneJoiner[ObservationEpoch] = AirborneJoiner(

@@ -17,14 +17,17 @@ from gbas_msgs_py.codes import EventKind, ServiceType
 from gbas_msgs_py.events import Event
 from gbas_msgs_py.records import ProtectionEpoch, SolutionEpoch
 from gbas_msgs_py.ros import fix_from_solution
-from gbas_node.node import ConfiguredParams, GbasNode, run
+from gbas_node.node import GbasNode, run
+from gbas_node.params import ConfiguredParams
 
 
 class ProtectionLevel(GbasNode):
     """Runs :meth:`AirborneReceiver.protect`; says that there is no service when solutions cease."""
 
+    params_type = ConfiguredParams
+
     def __init__(self, **kwargs: Any) -> None:
-        super().__init__("protection_level", ConfiguredParams, **kwargs)
+        super().__init__("protection_level", **kwargs)
         self.receiver = receiver_params(self, self.params.config)
         self.modes = tuple(mode.number for mode in configured_modes(self.receiver))
         self.states = dict.fromkeys(self.modes, ServiceState())

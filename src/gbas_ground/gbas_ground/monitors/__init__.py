@@ -31,7 +31,8 @@ business but the executive's (:mod:`gbas_ground.exclusions`).
 :mod:`~.divergence_classification`   which of the fifteen fault modes it looks like
 ===================================  ==========================================================
 
-What they share: the interface (:mod:`~.interface`), :mod:`~.result`, the double differences (:mod:`~.double_difference`), the sigma of a carrier
-(:mod:`~.carrier_noise`), the budget of false alarms (:mod:`~.false_alarm`) and the table of what they measured
-(:mod:`~.monitor_table`). What baselines can see is in :mod:`~.gradient_detectability`.
+What they share: the interface (:mod:`~.interface`), :mod:`~.result`, the double differences
+(:mod:`~.double_difference`), the sigma of a carrier (:mod:`~.carrier_noise`), the budget of false alarms
+(:mod:`~.false_alarm`) and the table of what they measured (:mod:`~.monitor_table`). What baselines can see is in
+:mod:`~.gradient_detectability`.
 """

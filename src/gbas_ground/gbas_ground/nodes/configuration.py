@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, Final
 
 from gbas_core.configuration import read_configuration
-from gbas_core.parameters import ParameterError, declared, merged, nested
+from gbas_core.parameters import ParameterError, merged, nested
 from gbas_ground.params import SECTION, GroundParams
 from gbas_node.node import GbasNode
 
@@ -25,7 +25,5 @@ def station_params(node: GbasNode, config: str) -> GroundParams:
     if not section and not overrides:
         raise ParameterError("no station: give its file as parameter 'config', or parameters 'ground.*'")
     station = GroundParams.from_mapping(merged(section, overrides), source=config or "ROS parameters")
-    for each in declared(station, PREFIX):
-        if each.value is not None:
-            node.declare_read_only(each.key, each.value, each.parameter.doc)
+    node.show_parameters(station, PREFIX)
     return station

@@ -11,15 +11,23 @@ from gbas_ground.station import GroundStation
 from gbas_msgs_py import tables, topics
 from gbas_msgs_py.records import IntegrityEpoch
 from gbas_msgs_py.ros import empty_frame
-from gbas_node.node import ConfiguredParams, GbasNode, run
+from gbas_node.node import GbasNode, run
+from gbas_node.params import ConfiguredParams
 
 
 class CorrectionBroadcast(GbasNode):
     """Runs :meth:`GroundStation.broadcast`; a frame without bursts is announced, so that nobody waits for it."""
 
+    params_type = ConfiguredParams
+
     def __init__(self, **kwargs: Any) -> None:
-        super().__init__("correction_broadcast", ConfiguredParams, **kwargs)
+<<<<<<< HEAD
+        super().__init__("correction_broadcast", **kwargs)
         self.station = GroundStation(station_params(self, self.params.config))
+=======
+        super().__init__("correction_broadcast", **kwargs)
+        self.station = station_params(self, self.params.config)
+>>>>>>> 208a224789ee9c367dc53311dde2c8d58d4a91c5
         self.state = BroadcastState()
         self.bursts_sent = 0
         self.send = self.burst_publisher(topics.VDB, readers=1)

@@ -12,18 +12,28 @@ from gbas_ground.nodes.configuration import station_params
 from gbas_ground.station import GroundEpoch, GroundStation
 from gbas_msgs_py import tables, topics
 from gbas_msgs_py.joining import EpochJoiner, JoinedEpoch
-from gbas_node.node import GbasNode, JoiningParams, run
+from gbas_node.node import GbasNode, run
+from gbas_node.params import JoiningParams
 
 
 class IntegrityMonitor(GbasNode):
     """Joins the receivers by epoch and runs :meth:`GroundStation.monitor`."""
 
+    params_type = JoiningParams
+
     def __init__(self, **kwargs: Any) -> None:
-        super().__init__("integrity_monitor", JoiningParams, **kwargs)
+<<<<<<< HEAD
+        super().__init__("integrity_monitor", **kwargs)
         params = station_params(self, self.params.config)
         self.station = GroundStation(params)
         self.state = self.station.initial_integrity()
         self.receivers = tuple(f"rr{j}" for j in range(1, params.n_receivers + 1))
+=======
+        super().__init__("integrity_monitor", **kwargs)
+        self.station = station_params(self, self.params.config)
+        self.state = initial_monitor_state(self.station)
+        self.receivers = tuple(f"rr{j}" for j in range(1, self.station.n_receivers + 1))
+>>>>>>> 208a224789ee9c367dc53311dde2c8d58d4a91c5
         self.joiner: EpochJoiner[ObservationEpoch] = EpochJoiner(self.receivers, timeout_s=self.params.join_timeout_s)
         self.integrity = self.table_publisher(topics.GROUND_INTEGRITY, tables.INTEGRITY, readers=1)
         self.statistics = self.table_publisher(topics.GROUND_MONITORS, tables.MONITORS)

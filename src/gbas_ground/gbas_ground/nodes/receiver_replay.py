@@ -3,73 +3,68 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
 from gbas_core.gnss.gpstime import from_epoch_key
 from gbas_core.gnss.observations import ObservationEpoch
 from gbas_core.io.recording import RecordedEpoch, Recording
-from gbas_core.satellites import SYSTEM_MASKS, satellites_of
+from gbas_core.parameters import Parameter, ParameterError, parameters
+from gbas_core.satellites import satellites_of
 from gbas_msgs_py import tables, topics
 from gbas_msgs_py.records import MAX_REFERENCE_RECEIVERS
-from gbas_node.driver import DriverNode, DriverParams, EphemerisFeed
-from gbas_node.node import require, run
+from gbas_node.driver import DriverNode, EphemerisFeed
+from gbas_node.node import run
+from gbas_node.params import DriverParams
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class ReceiverReplayParams(DriverParams):
-    """Parameters of the node beside those of every driver.
+    """Parameters of the node beside those of every driver. Files are RINEX or recorded RTCM 3."""
 
-    Attributes
-    ----------
-    ground_files : tuple of str
-        Observation files of one to four reference receivers, rr1 first: RINEX or recorded RTCM 3, like all files here.
-    user_file : str
-        Observation file of the aircraft; none for a station alone.
-    nav_files : tuple of str
-        Navigation files.
-    user_nav_files : tuple of str
-        Navigation files of the aircraft where they differ; they go to ``airborne/ephemeris``.
-    galileo : str
-        Preferred Galileo navigation message, ``"inav"`` or ``"fnav"``.
-    gps_week : int
-        GPS week of the first epoch of RTCM 3 streams; -1 where they have ephemerides that say it.
-    systems : str
-        Satellite systems that are sent.
-    start_s, stop_s : float
-        Part of the recording, in seconds after its first epoch; -1 for its beginning and end.
-    """
-
-    ground_files: tuple[str, ...] = ()
-    user_file: str = ""
-    nav_files: tuple[str, ...] = ()
-    user_nav_files: tuple[str, ...] = ()
-    galileo: str = "inav"
-    gps_week: int = -1
-    systems: str = "GE"
-    start_s: float = -1.0
-    stop_s: float = -1.0
+    ground_files: Annotated[
+        tuple[str, ...], Parameter("observation files of one to four reference receivers, rr1 first")
+    ]
+    nav_files: Annotated[tuple[str, ...], Parameter("navigation files")]
+    user_file: Annotated[str, Parameter("observation file of the aircraft; empty: a station alone")] = ""
+    user_nav_files: Annotated[
+        tuple[str, ...],
+        Parameter("navigation files of the aircraft where they differ; they go to airborne/ephemeris"),
+    ] = ()
+    galileo: Annotated[Literal["inav", "fnav"], Parameter("preferred Galileo navigation message")] = "inav"
+    gps_week: Annotated[
+        int,
+        Parameter(
+            "GPS week of the first epoch of RTCM 3 streams; -1 where they have ephemerides that say it",
+            "weeks", -1, 10_000,
+        ),
+    ] = -1  # fmt: skip
+    systems: Annotated[Literal["G", "E", "GE", "EG"], Parameter("satellite systems that are sent")] = "GE"
+    start_s: Annotated[
+        float, Parameter("first epoch sent, after that of the recording; -1: its beginning", "s", -1.0, 1e9)
+    ] = -1.0
+    stop_s: Annotated[
+        float, Parameter("last epoch sent, after the first of the recording; -1: its end", "s", -1.0, 1e9)
+    ] = -1.0
 
     def __post_init__(self) -> None:
-        super().__post_init__()
-        count = len(self.ground_files)
-        require("ground_files", self.ground_files, 1 <= count <= MAX_REFERENCE_RECEIVERS, "1 to 4 files")
-        require("nav_files", self.nav_files, bool(self.nav_files), "1 or more files")
-        require("galileo", self.galileo, self.galileo in ("inav", "fnav"), "inav or fnav")
-        require("gps_week", self.gps_week, self.gps_week >= -1, "-1 or a GPS week")
-        known = bool(self.systems) and set(self.systems) <= set(SYSTEM_MASKS)
-        require("systems", self.systems, known, f"letters of {''.join(SYSTEM_MASKS)}")
-        later = self.stop_s < 0.0 or self.stop_s >= self.start_s
-        require("stop_s", self.stop_s, later, f"-1 or not before start_s ({self.start_s:g})")
+        if not 1 <= len(self.ground_files) <= MAX_REFERENCE_RECEIVERS:
+            raise ParameterError(f"ground_files = {self.ground_files!r} is not 1 to {MAX_REFERENCE_RECEIVERS} files")
+        if not self.nav_files:
+            raise ParameterError("nav_files = () is not 1 or more files")
+        if 0.0 <= self.stop_s < self.start_s:
+            raise ParameterError(f"stop_s = {self.stop_s!r} is before start_s = {self.start_s!r}")
 
 
 class ReceiverReplay(DriverNode[RecordedEpoch]):
     """Sends a :class:`gbas_core.io.recording.Recording`, epoch by epoch; a receiver without data sends a marker row."""
 
+    params_type = ReceiverReplayParams
+
     def __init__(self, **kwargs: Any) -> None:
-        super().__init__("receiver_replay", ReceiverReplayParams, **kwargs)
+        super().__init__("receiver_replay", **kwargs)
         files = self.params
         self.recording = Recording.open(
             files.ground_files, files.user_file or None, files.nav_files,

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 from gbas_core.gnss.ephemeris import Ephemeris
 from gbas_core.gnss.gpstime import epoch_key
+from gbas_core.parameters import Parameter, parameters
 from gbas_msgs_py import tables, topics
 from gbas_msgs_py.joining import ReceptionQueue
 from gbas_msgs_py.tables import TruthEpoch
-from gbas_node.driver import DriverNode, DriverParams
+from gbas_node.driver import DriverNode
 from gbas_node.node import run
+from gbas_node.params import DriverParams
 from gbas_sim.scenario import open_world, read_sections, scenario_from_mapping, scenario_values
 from gbas_sim.world import SimulatedEpoch, Truth, World
 
@@ -21,17 +22,13 @@ EPHEMERIS_LEAD_S = 60.0
 """How long before they take effect ephemerides are sent [s]; nothing uses them for 120 s after."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class SimulatorParams(DriverParams):
-    """Parameters of the node beside those of every driver; the world's are in the file and in ``sim.*``.
+    """Parameters of the node beside those of every driver; the world's are in the file and in ``sim.*``."""
 
-    Attributes
-    ----------
-    config : str
-        Site file, see :mod:`gbas_sim.scenario`; ROS parameters ``ground.*`` and ``sim.*`` count more than it does.
-    """
-
-    config: str = ""
+    config: Annotated[
+        str, Parameter("site file (gbas_sim.scenario); ROS parameters ground.* and sim.* count more than it does")
+    ] = ""
 
 
 class Simulator(DriverNode[SimulatedEpoch]):
@@ -41,7 +38,7 @@ class Simulator(DriverNode[SimulatedEpoch]):
 
     def __init__(self, **kwargs: Any) -> None:
         self._world: World | None = None
-        super().__init__("simulator", self.params_type, **kwargs)
+        super().__init__("simulator", **kwargs)
         sections, _ = self._sections()
         for key, value in scenario_values(self.world.params, sections).items():
             self.declare_read_only(key, value, "simulated world")
