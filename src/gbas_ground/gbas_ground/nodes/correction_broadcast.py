@@ -21,13 +21,8 @@ class CorrectionBroadcast(GbasNode):
     params_type = ConfiguredParams
 
     def __init__(self, **kwargs: Any) -> None:
-<<<<<<< HEAD
         super().__init__("correction_broadcast", **kwargs)
         self.station = GroundStation(station_params(self, self.params.config))
-=======
-        super().__init__("correction_broadcast", **kwargs)
-        self.station = station_params(self, self.params.config)
->>>>>>> 208a224789ee9c367dc53311dde2c8d58d4a91c5
         self.state = BroadcastState()
         self.bursts_sent = 0
         self.send = self.burst_publisher(topics.VDB, readers=1)

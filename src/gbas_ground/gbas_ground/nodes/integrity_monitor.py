@@ -22,18 +22,11 @@ class IntegrityMonitor(GbasNode):
     params_type = JoiningParams
 
     def __init__(self, **kwargs: Any) -> None:
-<<<<<<< HEAD
         super().__init__("integrity_monitor", **kwargs)
         params = station_params(self, self.params.config)
         self.station = GroundStation(params)
         self.state = self.station.initial_integrity()
         self.receivers = tuple(f"rr{j}" for j in range(1, params.n_receivers + 1))
-=======
-        super().__init__("integrity_monitor", **kwargs)
-        self.station = station_params(self, self.params.config)
-        self.state = initial_monitor_state(self.station)
-        self.receivers = tuple(f"rr{j}" for j in range(1, self.station.n_receivers + 1))
->>>>>>> 208a224789ee9c367dc53311dde2c8d58d4a91c5
         self.joiner: EpochJoiner[ObservationEpoch] = EpochJoiner(self.receivers, timeout_s=self.params.join_timeout_s)
         self.integrity = self.table_publisher(topics.GROUND_INTEGRITY, tables.INTEGRITY, readers=1)
         self.statistics = self.table_publisher(topics.GROUND_MONITORS, tables.MONITORS)
