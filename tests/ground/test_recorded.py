@@ -28,14 +28,14 @@ def station_at(positions_m, **changes):
     latitude, longitude, height = (float(value) for value in geodetic_from_ecef(np.array(positions_m[0])))
     chosen = {
         "station.id": "TEST",
-        "station.station.latitude_rad": latitude,
-        "station.station.longitude_rad": longitude,
-        "station.station.height_m": height,
+        "station.latitude_rad": latitude,
+        "station.longitude_rad": longitude,
+        "station.height_m": height,
         **receiver_values(np.array(positions_m)),
         "receivers.minimum": min(2, len(positions_m)),
         "signal_power.require_cn0": False,
         "vdb.slots": "AB",
-        "station.station.gcid": 1,
+        "station.gcid": 1,
     }
     return made_of(GroundParams, chosen | {name.replace("__", "."): value for name, value in changes.items()})
 

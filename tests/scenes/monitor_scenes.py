@@ -62,8 +62,8 @@ def station_of(positions_m: FloatArray, systems: str) -> GroundParams:
     """A station with its reference point at the first receiver."""
     latitude, longitude, height = (float(value) for value in geodetic_from_ecef(np.array(positions_m[0])))
     return made_of(GroundParams, {
-        "station.id": "TEST", "station.station.latitude_rad": latitude, "station.station.longitude_rad": longitude,
-        "station.station.height_m": height, "station.station.systems": systems, "station.station.gcid": 1,
+        "station.id": "TEST", "station.latitude_rad": latitude, "station.longitude_rad": longitude,
+        "station.height_m": height, "station.systems": systems, "station.gcid": 1,
         **receiver_values(np.array(positions_m)), "receivers.minimum": 1, "signal_power.require_cn0": False,
         "vdb.slots": "AB", "ephemeris.settle_s": 0.0,
     })  # fmt: skip
