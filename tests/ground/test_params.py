@@ -47,7 +47,7 @@ def test_smallest_configuration_claims_nothing():
 
 def test_angles_are_degrees_in_files_only():
     station = GroundParams.from_mapping(changed(monitors={"elevation_mask_deg": 7.5}))
-    assert station.station.latitude_rad == pytest.approx(math.radians(52.32), abs=1e-15)
+    assert station.latitude_rad == pytest.approx(math.radians(52.32), abs=1e-15)
     assert station.monitors.elevation_mask_rad == pytest.approx(math.radians(7.5), abs=1e-15)
     assert GroundParams.from_mapping(MINIMAL).monitors.elevation_mask_rad == pytest.approx(math.radians(5.0), abs=1e-15)
 
@@ -70,13 +70,13 @@ def test_dotted_keys_and_ros_arrays_mean_the_same():
             {"expected_power": {"minimum_l1_dbhz": [30.0]}},
             "expected_power.minimum_l1_dbhz = (30.0,) is not one number a",
         ),
-        ({"station": {"gcid": 5}}, "station.station.gcid = 5 is not one of 1, 2, 3, 4, 7"),
-        ({"station": {"gcid": True}}, "station.station.gcid = True"),
+        ({"station": {"gcid": 5}}, "station.gcid = 5 is not one of 1, 2, 3, 4, 7"),
+        ({"station": {"gcid": True}}, "station.gcid = True"),
         ({"station": {"latitude_deg": 91.0}}, "station.latitude_deg = 91 is not within -90 to 90 deg"),
         ({"station": {"latitude_deg": float("nan")}}, "station.latitude_deg = nan"),
-        ({"station": {"height_m": "130 m"}}, "station.station.height_m = '130 m' is not a number"),
-        ({"station": {"systems": "GR"}}, "station.station.systems = 'GR'"),
-        ({"station": {"rsds": 49}}, "station.station.rsds = 49"),
+        ({"station": {"height_m": "130 m"}}, "station.height_m = '130 m' is not a number"),
+        ({"station": {"systems": "GR"}}, "station.systems = 'GR'"),
+        ({"station": {"rsds": 49}}, "station.rsds = 49"),
         ({"accuracy": {"designator": "D"}}, "accuracy.designator = 'D'"),
         ({"accuracy": {"inflation": 0.9}}, "accuracy.inflation = 0.9 is not within 1 to 100"),
         ({"accuracy": {"sigma_m": [0.3]}}, "accuracy.sigma_elevation_deg and sigma_m are not lists of one length"),
@@ -202,8 +202,8 @@ def test_reference_point_and_receivers():
     station = params(3)
     latitude, longitude, height = geodetic_from_ecef(station.reference_point_m())
     assert (latitude, longitude) == pytest.approx(
-        (station.station.latitude_rad, station.station.longitude_rad), abs=1e-12
+        (station.latitude_rad, station.longitude_rad), abs=1e-12
     )
-    assert height == pytest.approx(station.station.height_m, abs=1e-6)  # rounding of 6e6 m through the transformation
+    assert height == pytest.approx(station.height_m, abs=1e-6)  # rounding of 6e6 m through the transformation
     assert station.receiver_positions_m().shape == (3, 3)
     assert np.linalg.norm(station.receiver_positions_m() - station.reference_point_m(), axis=1).max() < 600.0
