@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import numpy as np
 from pydantic import BeforeValidator, WithJsonSchema
@@ -37,6 +37,7 @@ from gbas_ground.monitors.ephemeris_residual import EphemerisResidualParams
 from gbas_ground.monitors.expected_power import PowerExpectationParams
 from gbas_ground.monitors.expected_range import ExpectedRangeParams
 from gbas_ground.monitors.ionosphere_gradient import IonosphereGradientParams, gradient_site
+from gbas_ground.monitors.registry import SIGNAL_MONITORS
 from gbas_ground.monitors.sigma_monitor import SigmaMonitorParams
 from gbas_ground.monitors.signal_power import SignalPowerParams
 from gbas_ground.param_checks import check_station
@@ -289,6 +290,25 @@ class GroundParams:
             As :meth:`from_mapping`, and when the file is missing, is not YAML, or has no ``ground`` key.
         """
         return cls.from_mapping(read_configuration(path).section(SECTION), source=str(path))
+
+
+def _with_further_monitors(station: type[GroundParams]) -> type[GroundParams]:
+    """The class with a section for each monitor of the registry that has parameters and no section there."""
+    known = {each.name for each in fields(station)}
+    further = {
+        monitor.entry.name: monitor.parameters
+        for monitor in SIGNAL_MONITORS
+        if monitor.parameters is not None and monitor.entry.name not in known
+    }
+    if not further:
+        return station
+    sections = {name: kind() for name, kind in further.items()}
+    body = {"__annotations__": further, "__doc__": station.__doc__, "__module__": station.__module__, **sections}
+    return parameters(type(station.__name__, (station,), body))
+
+
+if not TYPE_CHECKING:
+    GroundParams = _with_further_monitors(GroundParams)
 
 
 def watching(params: GroundParams) -> GroundParams:

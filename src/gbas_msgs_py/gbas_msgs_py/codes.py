@@ -121,6 +121,7 @@ class ExclusionCause(Code):
         49,
         "Carriers do not fit, on several satellites, over the baselines of this receiver alone.",
     )
+    FURTHER_MONITOR = 50, "A monitor failed that has no cause of its own: the monitors table says which."
 
 
 FIRST_LATCHED: Final = 32
