@@ -99,7 +99,7 @@ ROOMS = {
         "nodes",
     ),
 }
-NO_ROOMS = {"params", "declared", "monitor_params", "approaches"}
+NO_ROOMS = {"params", "sections", "param_checks", "approaches"}
 # Names of satellites and bands, and constants of nature.
 AXES = ("gbas_core.satellites", "gbas_core.signals")
 ROS_MODULES = {

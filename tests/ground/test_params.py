@@ -201,9 +201,7 @@ def test_messages_of_a_full_station():
 def test_reference_point_and_receivers():
     station = params(3)
     latitude, longitude, height = geodetic_from_ecef(station.reference_point_m())
-    assert (latitude, longitude) == pytest.approx(
-        (station.latitude_rad, station.longitude_rad), abs=1e-12
-    )
+    assert (latitude, longitude) == pytest.approx((station.latitude_rad, station.longitude_rad), abs=1e-12)
     assert height == pytest.approx(station.height_m, abs=1e-6)  # rounding of 6e6 m through the transformation
     assert station.receiver_positions_m().shape == (3, 3)
     assert np.linalg.norm(station.receiver_positions_m() - station.reference_point_m(), axis=1).max() < 600.0
