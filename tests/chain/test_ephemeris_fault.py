@@ -45,7 +45,11 @@ def _fly(data: Path, folder: Path, ground_navigation: str, user_navigation: str)
     document = yaml.safe_load(config_path(NOMINAL_STATION).read_text(encoding="utf-8"))
     document["ground"]["station"]["max_use_distance_m"] = 0.0
     # A file of 30 s is too slow for monitors that are made for 2 Hz.
-    document["ground"] |= {"acceleration": {"exclude": False}, "ccd": {"exclude": False}, "ccd_f": {"exclude": "none"}}
+    document["ground"] |= {
+        "carrier_acceleration": {"exclude": False},
+        "ccd": {"exclude": False},
+        "ccd_f": {"exclude": "none"},
+    }
     station = folder / "unlimited_station.yaml"
     station.write_text(yaml.safe_dump(document), encoding="utf-8")
     prepared = prepare(
