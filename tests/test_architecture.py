@@ -67,7 +67,6 @@ ROOMS = {
         "exclusions",
         "consistency",
         "long_term",
-        "executive",
         "broadcast",
         "stages",
         "station",

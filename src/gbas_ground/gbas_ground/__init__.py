@@ -1,12 +1,12 @@
 """The ground station: observations of the reference receivers in, corrections and bursts out.
 
 =================  ==================================================================================================
-``station``        the epoch: channels, monitors, corrections, executive, in this order
-``monitoring``     runs the monitors;  ``exclusions`` latches what failed until it may be used again
+``params``         what a station is told, in the sections of its file;  ``prepared`` made ready once
+``station``        the epoch: ``stages`` one after the other (receive, track, monitor, correct, decide, report)
+``exclusions``     latches what failed until it may be used again
 ``channels``       ephemerides in use, predicted ranges, cycle slips and smoothing of every receiver's channels
 ``monitors``       one module each: a pure step that returns statistic, threshold and verdict
 ``corrections``    forming them, making them agree (B values), their sigmas
-``executive``      what each satellite may be used for, the table of channels, events
 ``ionosphere``     fronts that have not reached the station: threat model, geometry screening, inflation
 ``claims``         what the broadcast may claim of orbits, gradients and itself
 ``broadcast``      one epoch's corrections as the bursts of one frame

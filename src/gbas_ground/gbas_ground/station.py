@@ -18,7 +18,6 @@ from gbas_ground.broadcast import BroadcastState, broadcast_frame
 from gbas_ground.channels.ephemerides import EphemerisState, initial_ephemerides
 from gbas_ground.channels.tracking import initial_tracking
 from gbas_ground.consistency import no_exclusions
-from gbas_ground.executive.satellite_status import SatelliteStatus
 from gbas_ground.ionosphere.position_errors import compile_ahead
 from gbas_ground.ionosphere.protection import initial_ionosphere
 from gbas_ground.long_term import initial_long_term
@@ -29,6 +28,7 @@ from gbas_ground.stages.decide import DecideState, decide
 from gbas_ground.stages.monitor import MonitorState, initial_monitors, monitor_signals
 from gbas_ground.stages.receive import SOURCE, GroundEpoch, ReceiveState, receive
 from gbas_ground.stages.report import ReportState, StationReport, refusal, report
+from gbas_ground.stages.satellite_status import SatelliteStatus
 from gbas_ground.stages.track import TrackState, track_channels
 from gbas_msgs_py.codes import ChannelState, EventKind
 from gbas_msgs_py.events import EventLog

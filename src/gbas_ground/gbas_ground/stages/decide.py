@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from gbas_ground.broadcast import highest_sent
-from gbas_ground.executive.satellite_status import SatelliteStatus, satellite_status, withheld
 from gbas_ground.ionosphere.protection import IonosphereState, Protection, Sky, changes, protect
 from gbas_ground.prepared import PreparedStation
 from gbas_ground.stages.correct import Corrected
+from gbas_ground.stages.satellite_status import SatelliteStatus, satellite_status, withheld
 from gbas_msgs_py.codes import ChannelState, EventKind
 
 
@@ -38,19 +38,10 @@ class Decided(NamedTuple):
 
 def decide(state: DecideState, corrected: Corrected, station: PreparedStation) -> tuple[DecideState, Decided]:
     """Status of the satellites; what would be sent and cannot be protected is not used."""
-    tracked = corrected.monitored.tracked
-    events = tracked.received.now.events
+    events = corrected.monitored.tracked.received.now.events
     for each in corrected.findings:
         events.add(EventKind.EXCLUSION, each.subject, each.cause.word, each.value, each.threshold)
-    status = satellite_status(
-        tracked.tracked,
-        tracked.tracks,
-        tracked.received.known,
-        corrected.inputs,
-        corrected.corrections,
-        corrected.exclusions,
-        station.params,
-    )
+    status = satellite_status(corrected, station.params)
     ionosphere, protection = _protect(state.ionosphere, status, corrected, station)
     status = status if protection.available else withheld(status)
     return DecideState(ionosphere=ionosphere), Decided(corrected, status, protection)

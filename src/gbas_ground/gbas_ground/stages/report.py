@@ -9,13 +9,14 @@ import numpy as np
 from gbas_core.record import BoolArray
 from gbas_core.satellites import SAT_IDS
 from gbas_ground.broadcast import empty_integrity
-from gbas_ground.executive.channel_table import channel_epoch
-from gbas_ground.executive.satellite_status import SatelliteStatus, integrity_of
 from gbas_ground.monitors.monitor_table import monitor_detail_epoch, monitor_epoch
 from gbas_ground.prepared import PreparedStation
+from gbas_ground.stages.channel_table import channel_epoch
 from gbas_ground.stages.correct import Corrected
 from gbas_ground.stages.decide import Decided
+from gbas_ground.stages.integrity_table import integrity_of
 from gbas_ground.stages.receive import GroundEpoch
+from gbas_ground.stages.satellite_status import SatelliteStatus
 from gbas_msgs_py.codes import ChannelState, EventKind, ExclusionCause
 from gbas_msgs_py.events import Event, EventLog
 from gbas_msgs_py.records import ChannelEpoch, IntegrityEpoch, MonitorDetailEpoch, MonitorEpoch
@@ -72,26 +73,8 @@ def report(state: ReportState, decided: Decided, station: PreparedStation) -> tu
     tracked, signals = corrected.monitored.tracked, corrected.monitored.signals
     now = tracked.received.now
     time = now.gps_week, now.tow_s
-    integrity = integrity_of(
-        *time,
-        tracked.received.known,
-        corrected.inputs,
-        corrected.corrections,
-        status,
-        signals.orbit_bound,
-        decided.protection,
-        station.params,
-    )
-    channels = channel_epoch(
-        *time,
-        tracked.tracked,
-        tracked.tracks,
-        corrected.inputs,
-        corrected.corrections,
-        status,
-        corrected.exclusions,
-        state.channels,
-    )
+    integrity = integrity_of(decided, station.params)
+    channels = channel_epoch(decided, state.channels)
     usable = status.state == ChannelState.USABLE
     serving, contributing = bool(usable.any()), (corrected.corrections.used & usable).any(axis=1)
     _contribution_events(state.contributing, contributing, corrected, now.events)

@@ -1,4 +1,4 @@
-"""What each satellite may be used for, and the integrity record that says so."""
+"""What each satellite may be used for."""
 
 from __future__ import annotations
 
@@ -8,18 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gbas_core.record import BoolArray, FloatArray
-from gbas_core.satellites import N_SATS, missing
+from gbas_core.satellites import N_SATS
 from gbas_core.signals import L1
-from gbas_ground.channels.ephemerides import EphemerisState
-from gbas_ground.channels.tracking import Tracks
-from gbas_ground.claims.orbit_claim import claimed_decorrelation
-from gbas_ground.consistency import CorrectionInputs, Corrections, Exclusions
+from gbas_ground.consistency import Corrections, Exclusions
 from gbas_ground.corrections.sigma import MAX_SIGMA_M
-from gbas_ground.ionosphere.protection import Protection
 from gbas_ground.params import GroundParams
+from gbas_ground.stages.correct import Corrected
 from gbas_msgs_py.codes import FIRST_LATCHED, ChannelState, ExclusionCause
-from gbas_msgs_py.products import PRODUCTS
-from gbas_msgs_py.records import MAX_REFERENCE_RECEIVERS, IntegrityEpoch
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -30,22 +25,11 @@ class SatelliteStatus:
     cause: FloatArray
 
 
-def satellite_status(
-    tracked: BoolArray,
-    tracks: Tracks,
-    known: EphemerisState,
-    correction_inputs: CorrectionInputs,
-    corrections: Corrections,
-    exclusions: Exclusions,
-    params: GroundParams,
-) -> SatelliteStatus:
-    """Condition of every satellite; of several reasons against its use the first in the list below is told.
-
-    Parameters
-    ----------
-    tracked : (R, N) bool array
-        Channels with code and carrier.
-    """
+def satellite_status(corrected: Corrected, params: GroundParams) -> SatelliteStatus:
+    """Status of every satellite; where several reasons are against its use, the first applicable is reported."""
+    tracked, tracks = corrected.monitored.tracked.tracked, corrected.monitored.tracked.tracks
+    known = corrected.monitored.tracked.received.known
+    correction_inputs, corrections, exclusions = corrected.inputs, corrected.corrections, corrected.exclusions
     seen = tracked.any(axis=0)
     visible = correction_inputs.elevation_rad >= params.monitors.elevation_mask_rad
     usable = exclusions.usable_channels()
@@ -104,61 +88,3 @@ def withheld(status: SatelliteStatus) -> SatelliteStatus:
         state=np.where(usable, float(ChannelState.EXCLUDED), status.state),
         cause=np.where(usable, float(ExclusionCause.IONOSPHERE_UNPROTECTED), status.cause),
     )
-
-
-def integrity_of(
-    gps_week: int,
-    tow_s: float,
-    known: EphemerisState,
-    correction_inputs: CorrectionInputs,
-    corrections: Corrections,
-    status: SatelliteStatus,
-    orbit_bound: FloatArray,
-    protection: Protection,
-    params: GroundParams,
-) -> IntegrityEpoch:
-    """The record of an epoch: a row for every satellite in view, corrections where they are usable.
-
-    `orbit_bound` ``(N,)`` is what the ephemeris monitor supports, which P follows from [m/m].
-    """
-    usable = status.state == ChannelState.USABLE
-    row = (status.state != ChannelState.NOT_TRACKED) | (status.cause != ExclusionCause.NONE)
-
-    def of_row(values: FloatArray) -> FloatArray:
-        return np.where(row, values, np.nan)
-
-    def of_usable(values: FloatArray) -> FloatArray:
-        return np.where(usable, values, np.nan)
-
-    external = bool(params.ephemeris.external_monitor)
-    # the first products are those of the station's smoothing constants, in their order; it makes no others
-    made = len(corrections.prc_m)
-    claimed = (params.ephemeris.p, params.ephemeris.p_d or params.ephemeris.p)
-    p = [claimed_decorrelation(orbit_bound, each, external=external) for each in claimed]
-    sigma_m = [protection.inflated_m(corrections.sigmas.gnd_m), corrections.sigmas.gnd_30_m]
-    used = of_row((corrections.used & usable).astype(np.float64))
-    return IntegrityEpoch(
-        gps_week=gps_week,
-        tow_s=tow_s,
-        n_receivers=float((corrections.used & usable).any(axis=1).sum()),
-        sigma_vert_iono_gradient=protection.sigma_vig,
-        state=of_row(status.state),
-        cause=of_row(status.cause),
-        elevation_rad=of_row(correction_inputs.elevation_rad),
-        p_ephemeris=_on_axis(of_usable(np.array(p)), len(PRODUCTS)),
-        iod=of_row(known.current.iod),
-        ephemeris_crc=of_row(known.crc),
-        prc_m=_on_axis(of_usable(corrections.prc_m), len(PRODUCTS)),
-        rrc_mps=_on_axis(of_usable(corrections.rrc_mps), len(PRODUCTS)),
-        sigma_pr_gnd_m=_on_axis(of_usable(np.array(sigma_m)), len(PRODUCTS)),
-        sigma_pr_gnd_d_m=of_usable(corrections.sigmas.gnd_d_m),
-        b_m=_on_axis(of_usable(corrections.b_m), len(PRODUCTS), MAX_REFERENCE_RECEIVERS),
-        receiver_used=_on_axis(np.stack([used] * made), len(PRODUCTS), MAX_REFERENCE_RECEIVERS),
-    )
-
-
-def _on_axis(values: FloatArray, *shape: int) -> FloatArray:
-    """Values of what the station has, on axes that have room for more."""
-    result = missing(*shape)
-    result[tuple(slice(size) for size in values.shape[:-1])] = values
-    return result

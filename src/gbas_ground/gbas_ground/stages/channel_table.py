@@ -6,12 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gbas_core.record import BoolArray, FloatArray
+from gbas_core.record import FloatArray
 from gbas_core.satellites import missing
 from gbas_core.signals import L1
-from gbas_ground.channels.tracking import Tracks
-from gbas_ground.consistency import CorrectionInputs, Corrections, Exclusions
-from gbas_ground.executive.satellite_status import SatelliteStatus
+from gbas_ground.stages.decide import Decided
 from gbas_msgs_py.codes import ChannelState, ExclusionCause
 from gbas_msgs_py.records import MAX_REFERENCE_RECEIVERS, ChannelEpoch
 
@@ -23,46 +21,27 @@ class _Entries(NamedTuple):
     cause: FloatArray
 
 
-def channel_epoch(
-    gps_week: int,
-    tow_s: float,
-    tracked: BoolArray,
-    tracks: Tracks,
-    correction_inputs: CorrectionInputs,
-    corrections: Corrections,
-    status: SatelliteStatus,
-    exclusions: Exclusions,
-    before: ChannelEpoch | None,
-) -> ChannelEpoch:
-    """The table of one epoch.
-
-    Parameters
-    ----------
-    gps_week, tow_s
-        The epoch.
-    tracked : (R, N) bool array
-        Channels with code and carrier.
-    tracks, correction_inputs, corrections, status, exclusions
-        What the station found.
-    before : ChannelEpoch or None
-        The table of the epoch before, for the durations.
-    """
+def channel_epoch(decided: Decided, before: ChannelEpoch | None) -> ChannelEpoch:
+    """The table of one epoch; durations go on from the table `before`."""
+    corrected, status = decided.corrected, decided.status
+    now, tracked = corrected.monitored.tracked.received.now, corrected.monitored.tracked.tracked
+    exclusions = corrected.exclusions
     row = (status.state != ChannelState.NOT_TRACKED) | (status.cause != ExclusionCause.NONE)
     satellites = _Entries(np.where(row, status.state, np.nan), np.where(row, status.cause, np.nan))
-    channels = _channels(tracked, tracks, correction_inputs, corrections, status, exclusions)
+    channels = _channels(decided)
     shown = row & (tracked.any(axis=0) | exclusions.channels.excluded.any(axis=0))
     state, cause = missing(MAX_REFERENCE_RECEIVERS), missing(MAX_REFERENCE_RECEIVERS)
     state[: len(tracked)] = np.where(shown, channels.state, np.nan)
     cause[: len(tracked)] = np.where(shown, channels.cause, np.nan)
-    elapsed_s = 0.0 if not correction_inputs.dt_s > 0.0 else correction_inputs.dt_s
+    elapsed_s = now.dt_s if now.dt_s > 0.0 else 0.0
     since_s, channel_since_s = missing(), missing(MAX_REFERENCE_RECEIVERS)
     if before is not None:
         since_s = _same_for(satellites, _Entries(before.state, before.cause), before.since_s + elapsed_s)
         old = _Entries(before.channel_state, before.channel_cause)
         channel_since_s = _same_for(_Entries(state, cause), old, before.channel_since_s + elapsed_s)
     return ChannelEpoch(
-        gps_week=gps_week,
-        tow_s=tow_s,
+        gps_week=now.gps_week,
+        tow_s=now.tow_s,
         state=satellites.state,
         cause=satellites.cause,
         since_s=np.where(np.isnan(since_s) & row, 0.0, since_s),
@@ -77,18 +56,14 @@ def _same_for(now: _Entries, before: _Entries, since_s: FloatArray) -> FloatArra
     return np.where((now.state == before.state) & (now.cause == before.cause), since_s, np.nan)
 
 
-def _channels(
-    tracked: BoolArray,
-    tracks: Tracks,
-    correction_inputs: CorrectionInputs,
-    corrections: Corrections,
-    status: SatelliteStatus,
-    exclusions: Exclusions,
-) -> _Entries:
+def _channels(decided: Decided) -> _Entries:
     """Channels ``(R, N)``: what is wrong with a channel itself comes before what is wrong with its satellite."""
+    corrected, status = decided.corrected, decided.status
+    tracked, tracks = corrected.monitored.tracked.tracked, corrected.monitored.tracked.tracks
+    exclusions, settled = corrected.exclusions, corrected.inputs.settled
     by_receiver = np.broadcast_to(exclusions.receivers.excluded[:, np.newaxis], tracked.shape)
-    settling = np.isfinite(tracks.age_of(L1)) & ~correction_inputs.settled & (status.cause != ExclusionCause.BELOW_MASK)
-    usable = corrections.used & (status.state == ChannelState.USABLE)
+    settling = np.isfinite(tracks.age_of(L1)) & ~settled & (status.cause != ExclusionCause.BELOW_MASK)
+    usable = corrected.corrections.used & (status.state == ChannelState.USABLE)
     reasons = (
         (exclusions.channels.excluded, exclusions.channels.state, exclusions.channels.cause),
         (by_receiver, exclusions.receivers.state[:, np.newaxis], exclusions.receivers.cause[:, np.newaxis]),
