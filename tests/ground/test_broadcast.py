@@ -10,7 +10,7 @@ import pytest
 from gbas_core.gnss.gpstime import modified_z_count_s
 from gbas_core.positioning.approach import FinalApproach
 from gbas_core.satellites import IS_GPS, RANGING_SOURCE_ID, SOURCE_ID_INDEX
-from gbas_ground.broadcast import BroadcastState, broadcast_frame, empty_integrity
+from gbas_ground.broadcast import BroadcastState, empty_integrity
 from gbas_ground.sections import GCID_UNHEALTHY
 from gbas_ground.station import GroundStation
 from gbas_msgs_py.codes import ChannelState
@@ -182,28 +182,28 @@ def test_b_value_beyond_the_field_is_not_sent(full):
 def test_too_few_receivers_send_nothing(full, n_receivers):
     station, out = full
     integrity = dataclasses.replace(out.integrity[-1], n_receivers=n_receivers)
-    _, bursts = broadcast_frame(BroadcastState(), integrity, station)
+    _, bursts = GroundStation(station).broadcast(BroadcastState(), integrity)
     assert all(message.measurements == () for message in messages(bursts, Type1))
     assert {message.gcid for message in messages(bursts, Type2)} == {GCID_UNHEALTHY}
 
 
 def test_stale_epoch_gives_no_frame(full):
     station, out = full
-    state, bursts = broadcast_frame(out.state.broadcast, out.integrity[-1], station)
+    state, bursts = GroundStation(station).broadcast(out.state.broadcast, out.integrity[-1])
     assert bursts == ()
-    _, bursts = broadcast_frame(state, out.integrity[-5], station)
+    _, bursts = GroundStation(station).broadcast(state, out.integrity[-5])
     assert bursts == ()
 
 
 def test_epoch_between_frames_gives_no_frame(full):
     station, out = full
     odd = dataclasses.replace(out.integrity[-1], tow_s=out.integrity[-1].tow_s + 0.2)
-    assert broadcast_frame(BroadcastState(), odd, station)[1] == ()
+    assert GroundStation(station).broadcast(BroadcastState(), odd)[1] == ()
 
 
 def test_frame_without_integrity_is_a_live_but_empty_station():
     station = params(2)
-    _, bursts = broadcast_frame(BroadcastState(), empty_integrity(WEEK, TOW_S), station)
+    _, bursts = GroundStation(station).broadcast(BroadcastState(), empty_integrity(WEEK, TOW_S))
     assert messages(bursts, Type1)[0].measurements == ()
     assert messages(bursts, Type2)[0].gcid == GCID_UNHEALTHY
 

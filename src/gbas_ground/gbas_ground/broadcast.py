@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -22,20 +21,19 @@ from gbas_ground.corrections.sigma import MAX_SIGMA_M
 from gbas_ground.monitors.b_value import MAX_B_VALUE_M
 from gbas_ground.param_checks import MIN_SERVICE_SATELLITES
 from gbas_ground.params import GroundParams
+from gbas_ground.prepared import PreparedStation
 from gbas_ground.sections import GCID_UNHEALTHY, MAX_SIGMA_VIG
 from gbas_msgs_py.codes import ChannelState
 from gbas_msgs_py.products import PRODUCTS
 from gbas_msgs_py.records import MAX_REFERENCE_RECEIVERS, IntegrityEpoch
 from gbas_vdb.messages.tables import CORRECTION_ENTRIES
-from gbas_vdb.messages.types import Correction30, Correction100, FasDataSet, Type2
+from gbas_vdb.messages.types import Correction30, Correction100
 from gbas_vdb.transmission.burst import FRAME_DURATION_S, Burst
 from gbas_vdb.transmission.schedule import (
     Frame,
-    ScheduleParams,
     ScheduleState,
     SourceCorrection,
     schedule_frame,
-    sources_that_fit,
 )
 
 _FRAME_MS: Final = round(1000 * FRAME_DURATION_S)
@@ -92,15 +90,8 @@ def _counts(values: FloatArray) -> BoolArray:
     return np.asarray((values >= 0.0) & (values == np.floor(values)) & np.isfinite(values))
 
 
-@lru_cache(maxsize=8)
-def _constants(params: GroundParams) -> tuple[Type2, tuple[FasDataSet, ...], ScheduleParams, int]:
-    """Station data, approaches, schedule settings and how many satellites fit."""
-    station, approaches, schedule = params.station_message(), params.approach_messages(), params.schedule()
-    return station, approaches, schedule, sources_that_fit(station, approaches, schedule)
-
-
 def broadcast_frame(
-    state: BroadcastState, integrity: IntegrityEpoch, params: GroundParams
+    state: BroadcastState, integrity: IntegrityEpoch, station: PreparedStation
 ) -> tuple[BroadcastState, tuple[Burst, ...]]:
     """Bursts of the frame that begins at the integrity's epoch.
 
@@ -114,12 +105,12 @@ def broadcast_frame(
     order, arrival = state.order.step(key)
     if arrival is Arrival.REFUSED:
         return replace(state, order=order), ()
-    station, approaches, schedule, room = _constants(params)
+    params, settings = station.params, station.frames
     usable = broadcastable(integrity, params)
     sigma_vig = integrity.sigma_vert_iono_gradient
     enough = params.receivers.minimum <= integrity.n_receivers <= MAX_REFERENCE_RECEIVERS
     serves = bool(enough and 0.0 <= sigma_vig <= MAX_SIGMA_VIG)
-    satellites = _highest(usable, integrity.elevation_rad, room) if serves else ()
+    satellites = _highest(usable, integrity.elevation_rad, settings.room) if serves else ()
     serves = len(satellites) >= MIN_SERVICE_SATELLITES
     # a station that does not serve says so, and claims the least it can of the ionosphere
     gcid, sigma_vig = (params.station.gcid, sigma_vig) if serves else (GCID_UNHEALTHY, MAX_SIGMA_VIG)
@@ -127,17 +118,17 @@ def broadcast_frame(
         gps_week=integrity.gps_week,
         tow_s=integrity.tow_s,
         sources=_sources(integrity, satellites, params),
-        station=replace(station, gcid=gcid, sigma_vert_iono_gradient=sigma_vig),
-        approaches=approaches,
+        station=replace(settings.station, gcid=gcid, sigma_vert_iono_gradient=sigma_vig),
+        approaches=settings.approaches,
     )
-    scheduled, bursts = schedule_frame(state.schedule, frame, schedule)
+    scheduled, bursts = schedule_frame(state.schedule, frame, settings.schedule)
     return BroadcastState(schedule=scheduled, order=order), bursts
 
 
-def highest_sent(usable: BoolArray, elevation_rad: FloatArray, params: GroundParams) -> BoolArray:
+def highest_sent(usable: BoolArray, elevation_rad: FloatArray, room: int) -> BoolArray:
     """Of satellites that are usable those that the slots hold, ``(N,)``."""
     sent = np.zeros(usable.shape, dtype=bool)
-    sent[list(_highest(usable, elevation_rad, _constants(params)[3]))] = True
+    sent[list(_highest(usable, elevation_rad, room))] = True
     return sent
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,6 +24,17 @@ from gbas_ground.monitors.expected_power import PowerExpectationParams
 from gbas_ground.monitors.ionosphere_gradient import GradientSite, IonosphereGradientParams, gradient_site
 from gbas_ground.monitors.shared_receiver import Planes, planes_of
 from gbas_ground.params import GroundParams
+from gbas_vdb.messages.types import FasDataSet, Type2
+from gbas_vdb.transmission.schedule import ScheduleParams, sources_that_fit
+
+
+class FrameSettings(NamedTuple):
+    """What every frame is made with: station data, approaches, schedule, and how many satellites fit."""
+
+    station: Type2
+    approaches: tuple[FasDataSet, ...]
+    schedule: ScheduleParams
+    room: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +62,13 @@ class PreparedStation:
     def filters(self) -> ChannelFilterParams:
         """Settings of the channels' filters."""
         return filter_params(self.params)
+
+    @cached_property
+    def frames(self) -> FrameSettings:
+        """What every frame is made with."""
+        params = self.params
+        given = params.station_message(), params.approach_messages(), params.schedule()
+        return FrameSettings(*given, room=sources_that_fit(*given))
 
     # --- monitors
 

@@ -138,7 +138,7 @@ class GroundStation:
 
     def broadcast(self, state: BroadcastState, integrity: IntegrityEpoch) -> tuple[BroadcastState, tuple[Burst, ...]]:
         """Bursts of the frame at the integrity's epoch; see :func:`gbas_ground.broadcast.broadcast_frame`."""
-        return broadcast_frame(state, integrity, self.params)
+        return broadcast_frame(state, integrity, self._prepared)
 
     def step(self, state: StationState, epoch: GroundEpoch) -> tuple[StationState, StationReport, tuple[Burst, ...]]:
         """Both together."""

@@ -56,7 +56,7 @@ def _protect(
     if math.isnan(now.dt_s) and not params.ionosphere.protects:
         now.events.add(EventKind.STATION, "station", "ionosphere_no_threat_model")
     usable = status.state == ChannelState.USABLE
-    sent = highest_sent(usable, predicted.elevation_rad, params) if params.ionosphere.protects else usable
+    sent = highest_sent(usable, predicted.elevation_rad, station.frames.room) if params.ionosphere.protects else usable
     corrections = corrected.corrections
     sky = Sky(predicted.elevation_rad, predicted.azimuth_rad, corrections.sigmas.gnd_m, corrections.count)
     ionosphere, protection = protect(state, now.epoch_ms, sent, sky, params)
