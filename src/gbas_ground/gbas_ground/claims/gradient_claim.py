@@ -9,11 +9,11 @@ largest gradient that stays undetected
 For 300 mm/km, 30 s and 70 m/s that is 1.26 m and 0.3 m/km, and 2.76 m at 5 km.
 
 Gradients below the lower end of ``ionosphere_gradient.gradient_range`` are not looked for. Within the range a
-satellite is used when its baselines detect a share of at least ``gradient.min_coverage`` at the epoch. With a share
-of 1 none is left, so the largest undetected gradient is the lower end. With less it may be any of the range, for the
-blind gradients of a satellite wander over the range with its elevation and with the receivers that see it: then it is
-the upper end, which the fields can carry only if the range ends below 700 mm/km. Gradients beyond the upper end are
-not reckoned with: the range is the station's threat space.
+satellite is used when its baselines detect a share of at least ``ionosphere_gradient.min_coverage`` at the epoch.
+With a share of 1 none is left, so the largest undetected gradient is the lower end. With less it may be any of the
+range, for the blind gradients of a satellite wander over the range with its elevation and with the receivers that see
+it: then it is the upper end, which the fields can carry only if the range ends below 700 mm/km. Gradients beyond the
+upper end are not reckoned with: the range is the station's threat space.
 
 The largest values of both fields claim nothing.
 
