@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import signal
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -16,6 +18,7 @@ from std_msgs.msg import String
 
 from gbas_airborne.nodes.positioning import Positioning
 from gbas_airborne.nodes.protection_level import ProtectionLevel
+from gbas_bringup.environment import process_environment
 from gbas_core.gnss.observations import ObservationEpoch
 from gbas_ground.nodes.correction_broadcast import CorrectionBroadcast
 from gbas_ground.nodes.integrity_monitor import IntegrityMonitor
@@ -151,6 +154,32 @@ def test_signal_during_the_start_ends_the_program(launcher: Any, probe: Any) -> 
     process = launcher.start(PROTECTION)
     process.interrupt()  # until the node has taken over, Python may end by the signal or by an interrupted import
     assert not process.running
+
+
+SIGNALLED_EARLY = """
+import os, signal, time
+from gbas_node.node import GbasNode, serve
+
+class Early(GbasNode):
+    def __init__(self):
+        super().__init__("early")
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(0.3)  # the signal is taken by a thread
+
+    def finish(self):
+        print("finished", flush=True)
+
+raise SystemExit(serve([Early]))
+"""
+
+
+def test_signal_while_a_node_is_made_ends_it_in_order(domain: int) -> None:
+    """What it has received by then is not lost: a recorder reads before it is complete."""
+    done = subprocess.run(
+        [sys.executable, "-c", SIGNALLED_EARLY],
+        env=process_environment(domain=domain, isolated=True), capture_output=True, text=True, timeout=60.0,
+    )  # fmt: skip
+    assert (done.returncode, done.stdout) == (0, "finished\n"), done.stderr
 
 
 def test_parameters_are_visible_with_their_values_and_read_only(launcher: Any, probe: Any) -> None:

@@ -543,9 +543,9 @@ class _Signals:
     """SIGINT and SIGTERM as a flag.
 
     The signals are blocked and awaited by a thread: a handler would run only once the executor returns to Python, and
-    rclpy's own handlers end the context before anything pending can be published. A second signal ends at once.
-    Threads of libraries that were loaded before do not block them (those of BLAS); for what reaches these there is a
-    handler as well.
+    rclpy's own handlers end the context before anything pending can be published. A second signal ends at once; one
+    that comes while nodes are being made ends them as soon as they are. Threads of libraries that were loaded before do
+    not block them (those of BLAS); for what reaches these there is a handler as well.
     """
 
     _AWAITED: Final = frozenset({signal.SIGINT, signal.SIGTERM})
@@ -566,7 +566,8 @@ class _Signals:
             self._received()
 
     def _received(self) -> None:
-        if self.stop.is_set() or self.wake is None:
-            os._exit(EXIT_OK if self.wake is None else 130)
+        if self.stop.is_set():
+            os._exit(130)
         self.stop.set()
-        self.wake()
+        if self.wake is not None:  # before, the nodes are still being made; what they have received by then counts
+            self.wake()
