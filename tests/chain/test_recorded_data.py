@@ -19,17 +19,24 @@ from recorded_report import (
     unsmoothed,
     unsmoothed_difference_m,
 )
-from recorded_sets import recorded_sets, request, truth_ecef_m, truth_of_rows
+from recorded_sets import recorded_sets, truth_ecef_m, truth_of_rows
+from recorded_sets import request as request_of
 
 # Epochs until a filter of 100 s has settled (230 s after the first epoch at both ends) and the ephemeris CRCs of at
 # least four satellites have come round: no solution can be expected before.
 START_S = 245.0
 
 
-@pytest.fixture(scope="module")
-def results(data_dir: Path) -> dict[str, ProcessResult]:
+SHORT = 1500
+"""Epochs of the long recordings that every run looks at: 25 minutes of an hour; the whole is a campaign."""
+
+
+@pytest.fixture(
+    scope="module", params=[SHORT, pytest.param(None, marks=pytest.mark.campaign)], ids=["25 minutes", "whole"]
+)
+def results(data_dir: Path, request: pytest.FixtureRequest) -> dict[str, ProcessResult]:
     """Every set processed once."""
-    return {name: process(request(name, data_dir)) for name in recorded_sets()}
+    return {name: process(request_of(name, data_dir), count=request.param) for name in recorded_sets()}
 
 
 @pytest.mark.parametrize("name", recorded_sets())

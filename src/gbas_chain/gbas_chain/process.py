@@ -166,10 +166,13 @@ def prepare(request: ProcessRequest) -> Prepared:
     )
 
 
-def process(request: ProcessRequest, *, progress: Progress | None = None) -> ProcessResult:
-    """Run the chain over recorded files; `progress` is called with epochs done and epochs in all."""
+def process(request: ProcessRequest, *, progress: Progress | None = None, count: int | None = None) -> ProcessResult:
+    """Run the chain over recorded files, over the first `count` epochs or all.
+
+    `progress` is called with epochs done and epochs in all.
+    """
     prepared = prepare(request)
-    epochs = prepared.epochs()
+    epochs = prepared.epochs()[:count]
     outputs: list[AirborneOutput] = []
     events: list[Event] = []
     for output in prepared.chain().run(_counted(epochs, progress)):
