@@ -11,6 +11,7 @@ from std_msgs.msg import Float64MultiArray, UInt8MultiArray
 
 from gbas_core.gnss.observations import ObservationEpoch
 from gbas_msgs_py import ros, tables, topics
+from gbas_msgs_py.modes import L1_100
 from gbas_msgs_py.records import IntegrityEpoch, SolutionEpoch
 from gbas_vdb.transmission.burst import Burst
 
@@ -139,9 +140,9 @@ def test_protection_level(launcher: Any, probe: Any) -> None:
     topic, schema = topics.AIRBORNE_SOLUTION, tables.SOLUTION
     protections = probe.listen(topics.AIRBORNE_PROTECTION)
     process = launcher.start("gbas_airborne.nodes.protection_level", ALONE)
-    bad = bad_tables(schema, SolutionEpoch(gps_week=2300, tow_s=10.0))
+    bad = bad_tables(schema, SolutionEpoch(gps_week=2300, tow_s=10.0, mode=L1_100.number))
     check(probe, "protection_level", topic, bad, probe.publisher(topic))
-    probe.send(topic, schema, SolutionEpoch(gps_week=2300, tow_s=11.0))
+    probe.send(topic, schema, SolutionEpoch(gps_week=2300, tow_s=11.0, mode=L1_100.number))
     probe.until(lambda: protections, "the next good epoch")
     assert (protections[0].tow_s, protections[0].service, protections[0].alert) == (11.0, 0.0, 1.0)
     assert process.running

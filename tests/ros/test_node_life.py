@@ -24,6 +24,7 @@ from gbas_ground.nodes.correction_broadcast import CorrectionBroadcast
 from gbas_ground.nodes.integrity_monitor import IntegrityMonitor
 from gbas_ground.nodes.receiver_replay import ReceiverReplay
 from gbas_msgs_py import tables, topics
+from gbas_msgs_py.modes import L1_100
 from gbas_msgs_py.records import IntegrityEpoch, SolutionEpoch
 
 pytestmark = pytest.mark.ros
@@ -255,8 +256,10 @@ def test_second_aircraft_is_a_second_namespace(launcher: Any, probe: Any) -> Non
     first, second = probe.listen("airborne/protection_levels"), probe.listen("/gbas/two/airborne/protection_levels")
     launcher.start(PROTECTION, ALONE)
     launcher.start(PROTECTION, ALONE, ("-r", "__ns:=/gbas/two"))
-    probe.send("/gbas/two/airborne/solution", tables.SOLUTION, SolutionEpoch(gps_week=2300, tow_s=2.0))
-    probe.send("airborne/solution", tables.SOLUTION, SolutionEpoch(gps_week=2300, tow_s=1.0))
+    probe.send(
+        "/gbas/two/airborne/solution", tables.SOLUTION, SolutionEpoch(gps_week=2300, tow_s=2.0, mode=L1_100.number)
+    )
+    probe.send("airborne/solution", tables.SOLUTION, SolutionEpoch(gps_week=2300, tow_s=1.0, mode=L1_100.number))
     probe.until(lambda: first and second, "protection levels of both")
     assert ([each.tow_s for each in first], [each.tow_s for each in second]) == ([1.0], [2.0])
 
