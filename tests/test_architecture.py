@@ -45,7 +45,6 @@ ROOMS = {
         "satellites",
         "signals",
         "record",
-        "bounds",
         "errors",
         "parameters",
         "configuration",
@@ -85,7 +84,6 @@ ROOMS = {
         "nodes",
     ),
     "gbas_sim": (
-        "keys",
         "random_processes",
         "satellites",
         "atmosphere",
