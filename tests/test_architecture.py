@@ -45,7 +45,6 @@ ROOMS = {
         "satellites",
         "signals",
         "record",
-        "bounds",
         "errors",
         "parameters",
         "configuration",
@@ -84,7 +83,6 @@ ROOMS = {
         "nodes",
     ),
     "gbas_sim": (
-        "keys",
         "random_processes",
         "satellites",
         "atmosphere",

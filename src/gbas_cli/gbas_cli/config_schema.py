@@ -87,8 +87,26 @@ def _in_files(schema: dict[str, Any], name: str, definitions: dict[str, Any]) ->
     """A set's schema for files that may leave out and take away; its definitions go to those of the whole."""
     inner = schema.pop("$defs", {})
     for key, each in inner.items():
-        definitions[f"{name}.{key}"] = _open(each, name)
-    return _open({**schema, "title": name}, name)
+        definitions[f"{name}.{key}"] = _open(_together(each, inner), name)
+    return _open({**_together(schema, inner), "title": name}, name)
+
+
+def _together(schema: Any, definitions: dict[str, Any]) -> Any:
+    """The same with sections whose kind is told by the keys that are there as one with the keys of all kinds."""
+    if isinstance(schema, list):
+        return [_together(each, definitions) for each in schema]
+    if not isinstance(schema, dict):
+        return schema
+    if "oneOf" not in schema or "discriminator" in schema:
+        return {key: _together(each, definitions) for key, each in schema.items()}
+    kinds = [definitions[each["$ref"].removeprefix("#/$defs/")]["properties"] for each in schema["oneOf"]]
+    properties = {}
+    for key in {key: None for kind in kinds for key in kind}:
+        found = [kind[key] for kind in kinds if key in kind]
+        distinct = [each for number, each in enumerate(found) if each not in found[:number]]
+        properties[key] = distinct[0] if len(distinct) == 1 else {"anyOf": distinct}
+    rest = {key: each for key, each in schema.items() if key != "oneOf"}
+    return rest | {"type": "object", "properties": properties, "additionalProperties": False}
 
 
 def _open(schema: dict[str, Any], name: str, *, in_list: bool = False) -> dict[str, Any]:
@@ -100,13 +118,15 @@ def _open(schema: dict[str, Any], name: str, *, in_list: bool = False) -> dict[s
         return _by_kind(schema, name)
     found = {key: value for key, value in schema.items() if key != "required"}
     found |= _without_null_choice(found)
+    if "$ref" in found:
+        return _open(found, name)
     for key in ("properties", "patternProperties"):
         if key in found:
             found[key] = {each: _open(inner, name) for each, inner in found[key].items()}
     for key in ("items", "additionalProperties"):
         if isinstance(found.get(key), dict):
             found[key] = _open(found[key], name, in_list=key == "items")
-    for key in ("prefixItems", "anyOf", "oneOf", "allOf"):
+    for key in ("prefixItems", "anyOf", "allOf"):
         if key in found:
             found[key] = [_open(each, name, in_list=in_list or key == "prefixItems") for each in found[key]]
     if found.get("type") == "number":

@@ -9,10 +9,11 @@ from typing import Any, Final
 
 from gbas_airborne.params import AirborneParams
 from gbas_bringup.node_kinds import NODE_KINDS
-from gbas_core.parameters import Declared, Parameter, declared, from_mapping, json_schema
+from gbas_core.parameters import Declared, declared, from_mapping, json_schema
 from gbas_core.positioning.approach_keys import ApproachSection
 from gbas_ground.params import GroundParams
-from gbas_sim.scenario import open_world, scenario_from_mapping, scenario_values
+from gbas_sim.params import SimParams
+from gbas_sim.scenario import open_world, scenario_from_mapping, sim_params
 
 Sections = Mapping[str, Mapping[str, Any]]
 
@@ -53,13 +54,6 @@ def _ground_shown(station: GroundParams, sections: Sections) -> Iterator[Declare
         yield from (each for each in declared(approach, f"approaches.{name}.") if each.value is not None)
 
 
-def _sim_shown(world: Any, sections: Sections) -> Iterator[Declared]:
-    for key, value in scenario_values(world, sections).items():
-        yield Declared(
-            key=key.removeprefix("sim."), parameter=Parameter("simulated world"), kind=type(value), value=value
-        )
-
-
 SECTIONS: Final[dict[str, Section]] = {
     "ground": Section(
         reads=("ground",),
@@ -76,7 +70,8 @@ SECTIONS: Final[dict[str, Section]] = {
     "sim": Section(
         reads=("ground", "sim"),
         make=lambda sections, source: scenario_from_mapping(sections, source=source),
-        shown=_sim_shown,
+        shown=lambda _, sections: declared(sim_params(sections)),
+        models=(SimParams,),
         start=lambda world, source: open_world(world, source=source),
     ),
 }

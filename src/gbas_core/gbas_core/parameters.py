@@ -11,6 +11,10 @@ what it means, its unit and its bounds. Sets may hold others as fields: these ar
 Conventions: a field has the key of its name in a file, and SI units. Only angles differ: they are radians in the field
 ``mask_rad`` and degrees under the key ``mask_deg``; unit and bounds of their declaration are those of the file.
 
+A section may be one of several kinds, told by one of its keys (``kind: Annotated[Literal["front"], Parameter(...)]`` in
+each, ``discriminator="kind"`` in a ``pydantic.Field`` of the union), a mapping of names to sections (``dict[str,
+Threat]``), or sections in order (:class:`Numbered`).
+
 Values are checked when a set is made, from Python or from a file, by pydantic: the kind exactly (a whole number will do
 for a float), bounds, no NaN, no infinity, no unknown key. What is wrong is told by a :class:`ParameterError` that names
 key, value and bound in the file's unit.
@@ -23,6 +27,7 @@ import difflib
 import functools
 import math
 import re
+import types
 import typing
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
@@ -42,6 +47,7 @@ P = TypeVar("P")
 _ANGLES: Final = (("_rad", "_deg"), ("_radps", "_degps"))
 _FROM_FILE: Final = {"from_file": True}
 _OUT_OF_BOUNDS: Final = "out_of_bounds"
+_MOST_SHOWN: Final = 20
 _KINDS: Final = {
     "float_type": "is not a number",
     "float_parsing": "is not a number",
@@ -56,8 +62,10 @@ _KINDS: Final = {
     "dict_type": "is not a section of keys",
     "mapping_type": "is not a section of keys",
     "dataclass_type": "is not a section of keys",
+    "model_attributes_type": "is not a section of keys",
 }
 _UNKNOWN: Final = ("unexpected_keyword_argument", "extra_forbidden")
+_TAGS: Final = ("union_tag_invalid", "union_tag_not_found")
 _MISSING: Final = ("missing", "missing_keyword_only_argument", "missing_argument")
 
 
@@ -77,23 +85,27 @@ class Parameter:
         Unit in a file; ``"-"`` for numbers without one, texts and flags.
     low, high : float or None
         Bounds in that unit, both allowed; of each value of a list. None: there is no bound.
+    choices : tuple of str
+        The texts that are known, where they are the names of a table; none: any text, or those of a ``Literal``.
     """
 
     doc: str
     unit: str = "-"
     low: float | None = None
     high: float | None = None
+    choices: tuple[str, ...] = ()
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         """Lists become tuples and angles of files radians; then the exact kinds, then the bounds."""
         schema = _strict(handler(source))
-        inner = core_schema.with_info_before_validator_function(self._in_own_units, schema)
         if schema["type"] == "literal":
-            inner = core_schema.no_info_before_validator_function(partial(_same_kind, schema["expected"]), inner)
+            texts = all(isinstance(each, str) for each in schema["expected"])  # they may tell the kind of a section
+            return schema if texts else core_schema.no_info_before_validator_function(_same_kind(schema), schema)
+        inner = core_schema.with_info_before_validator_function(self._in_own_units, schema)
         return core_schema.no_info_after_validator_function(self._within, inner)
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        found = _bounded(handler.resolve_ref_schema(handler(schema)), self.low, self.high)
+        found = self._bounded(handler.resolve_ref_schema(handler(schema)))
         found["description"] = self.doc if self.unit == "-" else f"{self.doc} [{self.unit}]"
         return found
 
@@ -126,7 +138,13 @@ class Parameter:
         return float(value) * factor if number and factor != 1.0 else value
 
     def _within(self, value: Any) -> Any:
-        for each in _numbers(value):
+        for each in _leaves(value):
+            if isinstance(each, str) and self.choices and each not in self.choices:
+                raise PydanticCustomError(
+                    _OUT_OF_BOUNDS, "{shown} is not one of {bounds}", {"shown": f"{each!r}", "bounds": self.known()}
+                )
+            if isinstance(each, bool | str):
+                continue
             shown = self.in_file_units(each)
             low = -math.inf if self.low is None else self.low
             high = math.inf if self.high is None else self.high
@@ -139,10 +157,31 @@ class Parameter:
                 )
         return value
 
+    def _bounded(self, schema: dict[str, Any]) -> dict[str, Any]:
+        """A JSON Schema with the bounds at its numbers and the choices at its texts."""
+        found = dict(schema)
+        if found.get("type") in ("number", "integer"):
+            found |= {} if self.low is None else {"minimum": self.low}
+            found |= {} if self.high is None or math.isinf(self.high) else {"maximum": self.high}
+        if found.get("type") == "string" and self.choices:
+            found["enum"] = list(self.choices)
+        for key in ("items", "anyOf", "prefixItems"):
+            inner = found.get(key)
+            if isinstance(inner, dict):
+                found[key] = self._bounded(inner)
+            elif isinstance(inner, list):
+                found[key] = [self._bounded(each) for each in inner]
+        return found
+
+    def known(self) -> str:
+        """The choices in words; the first and the last of many."""
+        few = len(self.choices) <= _MOST_SHOWN
+        return ", ".join(self.choices if few else (*self.choices[:2], "...", self.choices[-1]))
+
     def bounds(self) -> str:
         """Bounds and unit in words."""
         unit = "" if self.unit == "-" else f" {self.unit}"
-        if self.high is None:
+        if self.high is None or math.isinf(self.high):
             return f"{self.low:.8g}{unit} or more"
         return (
             f"within {self.low:.8g} to {self.high:.8g}{unit}"
@@ -163,6 +202,30 @@ class Derived(Parameter):
         if info.context is not None and info.context.get("from_file", False):
             raise PydanticCustomError(_UNKNOWN[0], "is not set by files")
         return value
+
+
+class Numbered:
+    """For ``Annotated[tuple[Section, ...], Numbered()]``: sections in order, in a file a list, or keys 1, 2 and so on.
+
+    ROS parameter files hold no lists of sections.
+    """
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_before_validator_function(self._in_order, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        found = handler.resolve_ref_schema(handler(schema))
+        return {"anyOf": [found, {"type": "object", "additionalProperties": found["items"]}]}
+
+    def _in_order(self, value: Any) -> Any:
+        if not isinstance(value, Mapping):
+            return tuple(value) if isinstance(value, list) else value
+        keys = sorted(value, key=lambda key: (len(str(key)), str(key)))
+        if [str(key) for key in keys] != [str(number + 1) for number in range(len(keys))]:
+            raise PydanticCustomError(
+                _OUT_OF_BOUNDS, "keys {keys}, not 1 to {last}", {"keys": ", ".join(map(str, keys)), "last": len(keys)}
+            )
+        return tuple(value[key] for key in keys)
 
 
 @dataclass_transform(kw_only_default=True, frozen_default=True)
@@ -266,7 +329,7 @@ def replaced(params: P, values: Mapping[str, Any]) -> P:
 
 
 def nested(mapping: Mapping[str, Any]) -> dict[str, Any]:
-    """Dotted keys as sections; of a key and a section of the same name the later counts.
+    """Dotted keys as sections; a key without a value gives way to a section of its name.
 
     Raises
     ------
@@ -277,9 +340,17 @@ def nested(mapping: Mapping[str, Any]) -> dict[str, Any]:
     for key, value in mapping.items():
         first, dot, rest = str(key).partition(".")
         inner = nested({rest: value}) if dot else nested(value) if isinstance(value, Mapping) else value
-        below = found.get(first)
-        found[first] = merged(below, inner) if isinstance(below, dict) and isinstance(inner, dict) else inner
+        found[first] = _joined(found.get(first), inner, str(key))
     return found
+
+
+def _joined(below: Any, above: Any, key: str) -> Any:
+    """Two values of one key; sections together."""
+    if isinstance(below, dict) and isinstance(above, dict):
+        return below | {name: _joined(below.get(name), each, key) for name, each in above.items()}
+    if below is not None and above is not None and isinstance(below, dict) != isinstance(above, dict):
+        raise ParameterError(f"{key} is given, and a part of it is both a value and a section")
+    return above
 
 
 def merged(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
@@ -318,22 +389,38 @@ class Declared:
 def declared(params: Any, prefix: str = "") -> Iterator[Declared]:
     """Every parameter of a set (with its value) or of a class of them (with its default), those of sections included.
 
-    Fields without a :class:`Parameter` that are no sections, and sections that are None, are left out.
+    Fields without a :class:`Parameter` that are no sections, and sections that are None, are left out. Of a class
+    sections are shown with what they may hold: every kind, ``NAME`` for names, ``1`` for sections in order.
     """
+    kind = params if isinstance(params, type) else type(params)
     for item in dataclasses.fields(params):
-        hint = _hints(params if isinstance(params, type) else type(params))[item.name]
+        hint = _hints(kind)[item.name]
         key = f"{prefix}{file_key(item.name)}"
-        value = _default(item) if isinstance(params, type) else getattr(params, item.name)
+        value = _default(item) if params is kind else getattr(params, item.name)
         parameter = _parameter_of(hint)
         if isinstance(parameter, Derived):
             continue
         if parameter is not None:
             shown = value if value is dataclasses.MISSING else parameter.in_file_units(value)
             yield Declared(key=key, parameter=parameter, kind=hint.__origin__, value=shown)
-        elif value is dataclasses.MISSING and dataclasses.is_dataclass(hint):
-            yield from declared(hint, f"{key}.")
         elif dataclasses.is_dataclass(value):
             yield from declared(value, f"{key}.")
+        elif params is kind:
+            yield from _of_classes(hint, key)
+        elif isinstance(value, Mapping | tuple):
+            named = value.items() if isinstance(value, Mapping) else enumerate(value, 1)
+            for name, each in named:
+                if dataclasses.is_dataclass(each):
+                    yield from declared(each, f"{key}.{name}.")
+
+
+def _of_classes(hint: Any, key: str) -> Iterator[Declared]:
+    """Parameters of the sections that a field may hold."""
+    outer = typing.get_origin(_bare(hint))
+    inner = ".NAME" if outer is dict else ".1" if outer is tuple else ""
+    for each in _classes(hint):
+        if dataclasses.is_dataclass(each):
+            yield from declared(each, f"{key}{inner}.")
 
 
 def json_schema(kind: type[Any]) -> dict[str, Any]:
@@ -361,12 +448,17 @@ class _InFileUnits(GenerateJsonSchema):
             parameter, place = _parameter_of(_hints(schema["cls"])[each.name]), file_key(each.name)
             entry = found.get("properties", {}).get(place, {})
             entry.pop("title", None)
+            if "const" in entry:  # tells the kind of the section
+                found["required"] = [place, *found.get("required", [])]
             if isinstance(parameter, Derived):
                 found["properties"].pop(place, None)
             elif parameter is None:
                 entry.pop("default", None)
             elif "default" in entry:
-                entry["default"] = pydantic_core.to_jsonable_python(parameter.in_file_units(_default(each)))
+                default = parameter.in_file_units(_default(each))
+                entry["default"] = pydantic_core.to_jsonable_python(default)
+                if default == math.inf:  # JSON has none
+                    del entry["default"]
         return found
 
 
@@ -383,19 +475,25 @@ def _default(item: dataclasses.Field[Any]) -> Any:
     return item.default_factory() if item.default_factory is not dataclasses.MISSING else item.default
 
 
-def _numbers(value: Any) -> Iterator[float]:
+def _leaves(value: Any) -> Iterator[Any]:
+    """Numbers, texts and flags of a value."""
     if isinstance(value, tuple):
         for each in value:
-            yield from _numbers(each)
-    elif isinstance(value, (int, float)) and not isinstance(value, bool):
+            yield from _leaves(each)
+    elif isinstance(value, (int, float, str)):
         yield value
 
 
-def _same_kind(choices: list[Any], value: Any) -> Any:
+def _same_kind(schema: Any) -> Callable[[Any], Any]:
     """Refuse what only equals a choice: True is no 1."""
-    if type(value) not in map(type, choices):
-        raise PydanticCustomError("literal_error", "is no choice", {"expected": ", ".join(map(repr, choices))})
-    return value
+    choices = schema["expected"]
+
+    def checked(value: Any) -> Any:
+        if type(value) not in map(type, choices):
+            raise PydanticCustomError("literal_error", "is no choice", {"expected": ", ".join(map(repr, choices))})
+        return value
+
+    return checked
 
 
 _SCALARS: Final = ("float", "int", "bool", "str")
@@ -410,41 +508,30 @@ def _strict(schema: Any) -> Any:
     return [_strict(each) for each in schema] if isinstance(schema, list) else schema
 
 
-def _bounded(schema: dict[str, Any], low: float | None, high: float | None) -> dict[str, Any]:
-    """A JSON Schema with the bounds at its numbers."""
-    found = dict(schema)
-    if found.get("type") in ("number", "integer"):
-        found |= {} if low is None else {"minimum": low}
-        found |= {} if high is None else {"maximum": high}
-    for key in ("items", "anyOf", "prefixItems"):
-        inner = found.get(key)
-        if isinstance(inner, dict):
-            found[key] = _bounded(inner, low, high)
-        elif isinstance(inner, list):
-            found[key] = [_bounded(each, low, high) for each in inner]
-    return found
-
-
 # --- errors
 
 
 def _explained(kind: type[Any], error: ValidationError, section: str = "") -> ParameterError:
     """The first thing that is wrong, in the words of a file; what is missing comes after what is there and wrong."""
     found = min(error.errors(include_url=False), key=_is_missing)
-    path = tuple(str(each) for each in found["loc"] if isinstance(each, str))
-    key = ".".join((*([section] if section else []), *(file_key(each) for each in path)))
-    reason, value = found["type"], found["input"]
-    if reason in ("too_long", "too_short") or (reason in _MISSING and isinstance(found["loc"][-1], int)):
+    reason, value, loc = found["type"], found["input"], found["loc"]
+    path, there = _along(kind, loc)
+    key = ".".join((*([section] if section else []), *path))
+    if reason in ("too_long", "too_short") or (reason in _MISSING and isinstance(loc[-1], int)):
+        key = key.removesuffix(f".{loc[-1] + 1}") if isinstance(loc[-1], int) else key
         return ParameterError(f"{key} = {value!r} has not the right number of values")
     if reason in _UNKNOWN:
-        known = _keys(_section_at(kind, path[:-1]))
-        return ParameterError(f"{'.'.join((*key.split('.')[:-1], path[-1]))} is unknown{_nearest(path[-1], known)}")
+        known = _keys(_along(kind, loc[:-1])[1])
+        name = str(loc[-1])
+        return ParameterError(f"{'.'.join((*key.split('.')[:-1], name))} is unknown{_nearest(name, known)}")
     if reason in _MISSING:
-        return ParameterError(_missing(_hints(_section_at(kind, path[:-1])).get(_field_of(path[-1])), key))
+        return ParameterError(_missing(_hints(_along(kind, loc[:-1])[1]).get(_field_of(str(loc[-1]))), key))
     if reason == _OUT_OF_BOUNDS:
         return ParameterError(f"{key} = {found['msg']}")
     if reason in ("value_error", "assertion_error"):
-        return ParameterError(_below(kind, path, key, str(found["ctx"]["error"])))
+        return ParameterError(_below(there, key, str(found["ctx"]["error"])))
+    if reason in _TAGS:
+        return _of_no_kind(key, value, found["ctx"])
     if reason == "literal_error":
         return ParameterError(f"{key} = {value!r} is not one of {found['ctx']['expected'].replace(' or ', ', ')}")
     return ParameterError(f"{key} = {value!r} {_KINDS.get(reason, found['msg'])}")
@@ -466,14 +553,24 @@ def _missing(hint: Any, key: str) -> str:
     return f"{key} is missing" + (f" ({parameter.doc})" if parameter else "")
 
 
-def _below(kind: type[Any], path: tuple[str, ...], key: str, text: str) -> str:
+def _below(there: Any, key: str, text: str) -> str:
     """What a section, or a field with sections in it, says of itself; it may begin with one of its own keys."""
     if not key:
         return text
-    section = _section_at(kind, path)
-    is_section = not path or section is not _section_at(kind, path[:-1])
     first = re.split(r"[ .:=]", text, maxsplit=1)[0]
-    return f"{key}.{text}" if not is_section or first in _keys(section) else f"{key}: {text}"
+    is_section = isinstance(there, type) and is_pydantic_dataclass(there)
+    return f"{key}.{text}" if not is_section or first in _keys(there) else f"{key}: {text}"
+
+
+def _of_no_kind(key: str, value: Any, context: Mapping[str, Any]) -> ParameterError:
+    """The key that tells the kind of a section is missing, or its value unknown."""
+    if not isinstance(value, Mapping):
+        return ParameterError(f"{key} = {value!r} is not a section of keys")
+    teller = f"{key}.{context['discriminator'].strip(chr(39))}"
+    if "tag" not in context:
+        return ParameterError(f"{teller} is missing")
+    known = context["expected_tags"].replace("'", "")
+    return ParameterError(f"{teller} = {context['tag']!r} is not one of {known}")
 
 
 def _nearest(name: str, known: list[str]) -> str:
@@ -495,15 +592,43 @@ def _field_of(key: str) -> str:
     return key
 
 
-def _section_at(kind: Any, path: tuple[str, ...]) -> Any:
-    """Class of the section that a path of keys leads to; the last one that is known."""
-    for key in path:
-        hint = _hints(kind).get(_field_of(key))
-        inner = next((each for each in _classes(hint) if is_pydantic_dataclass(each)), None)
-        if inner is None:
-            return kind
-        kind = inner
-    return kind
+def _along(kind: Any, loc: tuple[int | str, ...]) -> tuple[list[str], Any]:
+    """Keys of a file on the way to a place of pydantic's, and the class or type that is there."""
+    keys: list[str] = []
+    for each in loc:
+        kind = _bare(kind)
+        if dataclasses.is_dataclass(kind):
+            keys.append(file_key(str(each)))
+            kind = _hints(kind).get(_field_of(str(each)))
+        elif typing.get_origin(kind) is dict:
+            keys.append(str(each))
+            kind = typing.get_args(kind)[1]
+        elif isinstance(each, int):  # in a list; sections have numbers, values have none
+            kind = (typing.get_args(kind) or (None,))[0]
+            if any(dataclasses.is_dataclass(inner) for inner in _classes(kind)):
+                keys.append(str(each + 1))
+        else:  # which of the kinds of a section it is
+            kind = next((member for member in _classes(kind) if each in _tags(member)), kind)
+    return keys, _bare(kind)
+
+
+def _bare(hint: Any) -> Any:
+    """A type without its annotations and without None."""
+    if hasattr(hint, "__metadata__"):
+        return _bare(hint.__origin__)
+    if typing.get_origin(hint) in (typing.Union, types.UnionType):
+        others = [each for each in typing.get_args(hint) if each is not type(None)]
+        return _bare(others[0]) if len(others) == 1 else hint
+    return hint
+
+
+def _tags(kind: Any) -> set[str]:
+    """What may tell that a section is of a class: the values of its literal fields, or its name."""
+    found = {kind.__name__}
+    for hint in _hints(kind).values() if dataclasses.is_dataclass(kind) else ():
+        if typing.get_origin(_bare(hint)) is typing.Literal:
+            found |= set(typing.get_args(_bare(hint)))
+    return found
 
 
 def _classes(hint: Any) -> Iterator[Any]:

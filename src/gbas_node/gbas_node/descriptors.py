@@ -35,6 +35,8 @@ def _in_words(parameter: Parameter, kind: Any) -> str:
     words = []
     if choices := _choices(kind):
         words.append(f"one of {', '.join(map(repr, choices))}")
+    if parameter.choices:
+        words.append(f"one of {parameter.known()}")
     if parameter.low is not None or parameter.high is not None:
         each = "each " if _is_list(kind) else ""
         words.append(f"{each}{parameter.bounds()}")

@@ -97,11 +97,11 @@ def test_curve():
     [
         (
             lambda: LinkBudget(antenna="dish"),
-            "link budget: antenna = 'dish' is not one of isotropic, mla, patch, fighter",
+            "antenna = 'dish' is not one of isotropic, mla, patch, fighter",
         ),
-        (lambda: LinkBudget(noise_figure_db=-1.0), "link budget: noise_figure_db = -1.0 is not within 0 to 20"),
-        (lambda: LinkBudget(gps_dbw=(-160.0,)), "link budget: gps_dbw = (-160.0,) is not two numbers"),
-        (lambda: Cn0Curve(zenith_dbhz=(50.0, 99.0)), "C/N0: zenith_dbhz = (50.0, 99.0) is not within 0 to 80"),
+        (lambda: LinkBudget(noise_figure_db=-1.0), "noise_figure_db = -1 is not within 0 to 20 dB"),
+        (lambda: LinkBudget(gps_dbw=(-160.0,)), "gps_dbw = (-160.0,) has not the right number of values"),
+        (lambda: Cn0Curve(zenith_dbhz=(50.0, 99.0)), "zenith_dbhz = 99 is not within 0 to 80 dB-Hz"),
         (
             lambda: AntennaPattern(name="x", elevation_deg=(0.0, 90.0), gain_dbic=(0.0, 0.0), cross_dbic=(0.0, 0.0)),
             "antenna x: elevation_deg = (0.0, 90.0) does not go from -90 to 90",

@@ -244,7 +244,10 @@ def test_missing_satellites():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Scene(ground="marble"), "scene: ground = 'marble' is not one of"),
+        (
+            lambda: Scene(ground="marble"),
+            "ground = 'marble' is not one of metal, concrete, glass, ",
+        ),
         (lambda: Facet(corner_m=(0.0,) * 3, first_m=(1.0, 0.0, 0.0), second_m=(2.0, 0.0, 0.0)), "span no area"),
         (
             lambda: box(center_m=(0.0, 0.0), size_m=(1.0, 0.0, 1.0), heading_rad=0.0),

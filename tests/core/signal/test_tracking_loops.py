@@ -189,10 +189,10 @@ def test_chips():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"spacing_chips": (0.1, 0.1, 0.0)}, "tracking: spacing_chips = (0.1, 0.1, 0.0) is not within 0.02 to 1"),
-        ({"spacing_chips": (0.1, 0.1)}, "tracking: spacing_chips = (0.1, 0.1) is not three numbers"),
-        ({"code_bandwidth_hz": -1.0}, "tracking: code_bandwidth_hz = -1.0 is not within 0.01 to 10"),
-        ({"integration_s": math.nan}, "tracking: integration_s = nan is not within 0.001 to 1"),
+        ({"spacing_chips": (0.1, 0.1, 0.0)}, "spacing_chips = 0 is not within 0.02 to 1 chips"),
+        ({"spacing_chips": (0.1, 0.1)}, "spacing_chips = (0.1, 0.1) has not the right number of values"),
+        ({"code_bandwidth_hz": -1.0}, "code_bandwidth_hz = -1 is not within 0.01 to 10 Hz"),
+        ({"integration_s": math.nan}, "integration_s = nan is not a finite number"),
     ],
 )
 def test_bad_parameters_are_refused(changes, message):

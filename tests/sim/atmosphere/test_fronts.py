@@ -368,19 +368,19 @@ def test_threat_space_by_elevation():
         ({"threat_space": "germany"}, "gradient = 0.0004 is not within 0 to 0.00014 of germany"),
         ({"threat_space": "gast_d", "speed_mps": 800.0}, "gradient = 0.0004 is not within 0 to 0.0001 of gast_d"),
         ({"threat_space": "brazil", "speed_mps": 10.0}, "speed_mps = 10 is not within 40 to 250 of brazil"),
-        ({"threat_space": "mars"}, "threat_space = 'mars' is not one of conus, "),
-        ({"width_m": -1.0}, "width_m = -1.0 is not within 1 to 1e"),
+        ({"threat_space": "mars"}, "threat_space = 'mars' is not one of , conus, "),
+        ({"width_m": -1.0}, "width_m = -1 is not within 1 to 10000000 m"),
         ({"max_delay_m": 30.0}, "max_delay_m = 30.0 is not gradient times width_m = 40"),
         ({"width_m": None}, "width_m and max_delay_m are both missing"),
-        ({"gradient": math.nan}, "gradient = nan is not within"),
-        ({"edge": "upper"}, "edge = 'upper' is not one of trailing, leading"),
-        ({"reference": "moon"}, "reference = 'moon' is not one of baseline, ray, pierce, earth"),
-        ({"satellites": ("G01", "X9")}, "satellites = 'X9' is not a satellite such as 'G07'"),
-        ({"speed_mps": -1.0}, "speed_mps = -1.0 is not within 0 to"),
+        ({"gradient": math.nan}, "gradient = nan is not a finite number"),
+        ({"edge": "upper"}, "edge = 'upper' is not one of 'trailing', 'leading'"),
+        ({"reference": "moon"}, "reference = 'moon' is not one of 'baseline', 'ray', 'pierce', 'earth'"),
+        ({"satellites": ("G01", "X9")}, "satellites = 'X9' is not one of G01, G02"),
+        ({"speed_mps": -1.0}, "speed_mps = -1 is not within 0 to 10000 m/s"),
     ],
 )
 def test_front_refuses(changes, message):
-    with pytest.raises(ValueError, match="front: " + message):
+    with pytest.raises(ValueError, match=message):
         WedgeFront(**(INSIDE | changes))
 
 
@@ -398,11 +398,11 @@ def test_depth_or_width():
         ({"front_wall_m": 19_000.0}, "front_wall_m = 19000 is not within 20000 to 450000 of brazil"),
         ({"depth_m": 25.0, "back_wall_m": 20_000.0}, "gradient = 0.00125 is not within"),
         ({"speed_mps": 300.0}, "speed_mps = 300 is not within 40 to 250 of brazil"),
-        ({"floor_m": -1.0}, "floor_m = -1.0 is not within"),
+        ({"floor_m": -1.0}, "floor_m = -1 is not within 0 to 10000000 m"),
     ],
 )
 def test_bubble_refuses(changes, message):
     values = {"depth_m": 17.0, "front_wall_m": 20_000.0, "back_wall_m": 20_000.0, "threat_space": "brazil"}
     PlasmaBubble(**values)
-    with pytest.raises(ValueError, match="bubble: " + message):
+    with pytest.raises(ValueError, match=message):
         PlasmaBubble(**(values | changes))

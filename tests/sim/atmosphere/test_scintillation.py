@@ -296,5 +296,5 @@ def test_losses_are_of_the_paths_there_are():
     ],
 )
 def test_refusals(key, value):
-    with pytest.raises(ValueError, match=f"scintillation: {key} = "):
+    with pytest.raises(ValueError, match=f"^{key} = "):
         ScintillationParams(**{key: value})

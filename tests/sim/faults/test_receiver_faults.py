@@ -119,7 +119,7 @@ def test_frozen_from_the_start_has_nothing_to_repeat():
     [
         (
             lambda: RangeFault(receiver="rr5", start_s=0.0, step_m=1.0),
-            "fault range: receiver = 'rr5' is not one of rr1",
+            "receiver = 'rr5' is not one of rr1, rr2, rr3, rr4, airborne",
         ),
         (
             lambda: RangeFault(receiver="rr1", start_s=0.0),

@@ -118,9 +118,9 @@ def test_wind_profile_meets_its_heights_and_does_not_overshoot() -> None:
     [
         ({"height_m": (0.0,), "speed_mps": (5.0, 6.0), "from_rad": (0.0,)}, "have 1, 2 and 1 values"),
         ({"height_m": (100.0, 0.0), "speed_mps": (5.0, 5.0), "from_rad": (0.0, 0.0)}, "does not grow"),
-        ({"height_m": (0.0,), "speed_mps": (-1.0,), "from_rad": (0.0,)}, "speed_mps = (-1.0,) is not within 0 to 150"),
+        ({"height_m": (0.0,), "speed_mps": (-1.0,), "from_rad": (0.0,)}, "speed_mps = -1 is not within 0 to 150"),
         ({"height_m": (0.0,), "speed_mps": (float("nan"),), "from_rad": (0.0,)}, "speed_mps"),
-        ({"height_m": (0.0,), "speed_mps": (1.0,), "from_rad": (99.0,)}, "from_rad"),
+        ({"height_m": (0.0,), "speed_mps": (1.0,), "from_rad": (99.0,)}, "from_deg = 5672"),
         ({"height_m": (1e6,), "speed_mps": (1.0,), "from_rad": (0.0,)}, "height_m"),
     ],
 )

@@ -186,11 +186,11 @@ def test_alpha_and_lift_are_inverse(aircraft: Aircraft) -> None:
     ("part", "changes", "message"),
     [
         (None, {"mass_kg": 10.0, "empty_mass_kg": 20.0}, "mass_kg = 10.0 is less than empty_mass_kg = 20.0"),
-        (None, {"wing_area_m2": 0.0}, "wing_area_m2 = 0.0 is not within 0.05 to 1000"),
+        (None, {"wing_area_m2": 0.0}, "wing_area_m2 = 0 is not within 0.05 to 1000 m^2"),
         ("clean", {"drag_zero": float("nan")}, "drag_zero = nan"),
         ("clean", {"lift_max": 0.31, "lift_zero": 0.4}, "lift_max"),
-        ("engine", {"thrust_n": -1.0}, "thrust_n = -1.0"),
-        ("limits", {"bank_rad": 2.0}, "bank_rad = 2 (114.592 deg) is not within"),
+        ("engine", {"thrust_n": -1.0}, "thrust_n = -1 is not within"),
+        ("limits", {"bank_rad": 2.0}, "bank_deg = 114.591559 is not within 5 to 85 deg"),
         ("response", {"lateral_radps": 3.0}, "lateral_radps"),
     ],
 )

@@ -8,7 +8,9 @@ import textwrap
 import pytest
 import yaml
 
+from gbas_core.parameters import from_mapping, nested
 from gbas_core.positioning.approach import FinalApproach
+from gbas_sim.flight import params
 from gbas_sim.flight.dynamics import (
     AIRLINER,
     FIGHTER,
@@ -19,9 +21,9 @@ from gbas_sim.flight.dynamics import (
     Start,
     StraightInApproach,
     Turn,
-    flight_from_mapping,
-    keys,
 )
+from gbas_sim.flight.params import flight_of
+from gbas_sim.params import SimParams
 
 APPROACH = FinalApproach.from_course(
     ltp_lat_rad=0.9,
@@ -44,6 +46,10 @@ segments:
       intercept_distance_m: 9000.0, level_time_s: 90.0}
   4: {kind: missed_approach, from_height_m: 60, height_gain_m: 600.0, vertical_speed_mps: 10.0, speed_mps: 85}
 """)
+
+
+def flight_from_mapping(mapping, approach=None):
+    return flight_of(from_mapping(SimParams, {"flight": nested(mapping)}).flight, approach)
 
 
 def changed(**changes):
@@ -69,7 +75,7 @@ def test_every_key_is_read() -> None:
 
 def test_the_documented_example_can_be_flown() -> None:
     """The example in the module's description, but for the start, which goes with plans without an approach."""
-    block = keys.__doc__.split("::\n\n")[1].split("\n\nor,")[0]
+    block = params.__doc__.split("::\n\n")[1].split("\n\nor,")[0]
     example = yaml.safe_load(textwrap.dedent(block))
     del example["start"]
     flight = flight_from_mapping(example, approach=APPROACH)
@@ -121,39 +127,51 @@ def segment(**keys):
 @pytest.mark.parametrize(
     ("mapping", "message"),
     [
-        (changed(colour="red"), "flight: colour is unknown; known are"),
+        (changed(colour="red"), "flight.colour is unknown; known are"),
         (changed(aircraft="zeppelin"), "aircraft = 'zeppelin' is not one of fighter, airliner, small_uav"),
         (changed(mass_kg=10.0), "mass_kg = 10.0 is less than empty_mass_kg"),
         (changed(mass_kg="heavy"), "mass_kg = 'heavy' is not a number"),
         (changed(speed_mps=True), "speed_mps = True is not a number"),
-        (changed(speed_mps=1000.0), "speed_mps = 1000.0 is not within 5 to 320"),
+        (changed(speed_mps=1000.0), "flight.speed_mps = 1000 is not within 5 to 320 m/s"),
         (changed(speed_mps=None), "speed_mps is missing"),
         (changed(segments=None), "segments is missing"),
         (changed(segments=[]), "segments is empty"),
-        (changed(segments=3), "segments = 3 is not a list of manoeuvres"),
-        (changed(segments={1: FILE["segments"][1], 3: FILE["segments"][2]}), "segments has the keys 1, 3, not 1 to 2"),
-        (changed(configuration="flaps"), "configuration = 'flaps' is not clean or landing"),
+        (changed(segments=3), "flight.segments = 3 is not a list"),
+        (changed(segments={1: FILE["segments"][1], 3: FILE["segments"][2]}), "flight.segments = keys 1, 3, not 1 to 2"),
+        (changed(configuration="flaps"), "flight.configuration = 'flaps' is not one of 'clean', 'landing'"),
         (changed(turning_earth="no"), "turning_earth = 'no' is not true or false"),
-        (changed(profile="five_phase"), "speed_mps is given, but profile says what is flown"),
-        ({"profile": "six_phase"}, "profile = 'six_phase' is not five_phase"),
-        (changed(start={"latitude_deg": 1.0}), "start: longitude_deg is missing"),
+        (
+            changed(profile="five_phase"),
+            "flight.speed_mps is unknown; known are aircraft, mass_kg, planned_wind, profile",
+        ),
+        ({"profile": "six_phase"}, "flight.profile = 'six_phase' is not one of 'five_phase'"),
+        (changed(start={"latitude_deg": 1.0}), "flight.start.longitude_deg is missing"),
         (
             changed(start={"latitude_deg": 1, "longitude_deg": 1, "height_m": 1, "heading_deg": 1}),
             "start is given, but the flight is laid out from its approach",
         ),
         (changed(wind={"speed_mps": 5.0}), "wind.speed_mps = 5.0 is not a list"),
-        (changed(wind={"height_m": [0.0], "speed_mps": [-5.0], "from_deg": [0.0]}), "wind: wind: speed_mps"),
+        (
+            changed(wind={"height_m": [0.0], "speed_mps": [-5.0], "from_deg": [0.0]}),
+            "flight.wind.speed_mps = -5 is not within 0 to 150 m/s",
+        ),
         (changed(wind={"gusts": 1}), "wind.gusts is unknown"),
         (segment(kind="loop"), "segments.2.kind = 'loop' is not one of cruise, climb"),
-        (segment(kind="turn", bank_deg=20.0), "segments.2: heading_change_deg is missing"),
-        (segment(kind="turn", heading_change_deg=9.0, bank_deg="x"), "segments.2.bank_deg = 'x' is not a float"),
-        (segment(kind="turn", heading_change_deg=9.0, bank_deg=89.0), "segments.2: turn: bank_rad = 1.55334 (89 deg)"),
-        (segment(kind="turn", heading_change_deg=9.0), "neither is given, exactly one of bank_rad and duration_s"),
+        (segment(kind="turn", bank_deg=20.0), "flight.segments.2.heading_change_deg is missing"),
+        (segment(kind="turn", heading_change_deg=9.0, bank_deg="x"), "segments.2.bank_deg = 'x' is not a number"),
+        (
+            segment(kind="turn", heading_change_deg=9.0, bank_deg=89.0),
+            "flight.segments.2.bank_deg = 89 is not within 1 to 80 deg",
+        ),
+        (segment(kind="turn", heading_change_deg=9.0), "neither is given, exactly one of bank_deg and duration_s"),
         (segment(kind="turn", heading_change_deg=9.0, bank_rad=0.1), "segments.2.bank_rad is unknown"),
-        (segment(kind="cruise", duration_s=float("nan")), "segments.2: cruise: duration_s = nan"),
+        (segment(kind="cruise", duration_s=float("nan")), "flight.segments.2.duration_s = nan is not a finite number"),
         (changed(segments=[FILE["segments"][number] for number in (1, 3, 4, 4)]), "segment 4 is a missed approach"),
         (segment(kind="straight_in", speed_mps=70, duration_s=300), "segments 2 and 3 are both approaches"),
-        ({"segments.1": 3, "segments.1.kind": "cruise"}, "segments.1.kind is given within 1, which is not a section"),
+        (
+            {"segments.1": 3, "segments.1.kind": "cruise"},
+            "segments.1.kind is given, and a part of it is both a value and a section",
+        ),
     ],
 )  # fmt: skip
 def test_refusals(mapping, message: str) -> None:

@@ -114,10 +114,10 @@ def test_smoothing_gain_is_the_filters(tau_s, correlation_s):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: error(correlation_s=-1.0), "error test: correlation_s = -1.0 is not within 0 to 100000"),
-        (lambda: error(code=CURVES[:2]), "error test: code has not three curves"),
+        (lambda: error(correlation_s=-1.0), "correlation_s = -1 is not within 0 to 100000 s"),
+        (lambda: error(code=CURVES[:2]), "has not the right number of values"),
         (lambda: ElevationCurve(elevation_deg=(10.0, 5.0), sigma_m=(1.0, 1.0)), "(10.0, 5.0) is not ascending"),
-        (lambda: ElevationCurve(elevation_deg=(10.0,), sigma_m=(-1.0,)), "sigma_m = (-1.0,) is not within 0 to 100"),
+        (lambda: ElevationCurve(elevation_deg=(10.0,), sigma_m=(-1.0,)), "sigma_m = -1 is not within 0 to 100 m"),
         (lambda: ElevationCurve(elevation_deg=(), sigma_m=()), "or both are empty"),
     ],
 )

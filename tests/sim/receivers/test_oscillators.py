@@ -93,7 +93,7 @@ def test_hardware_delays():
 
 
 def test_bad_parameters_are_refused():
-    with pytest.raises(ValueError, match="oscillator: drift = 1.0 is not within 0 to 1e-05"):
+    with pytest.raises(ValueError, match="drift = 1 is not within 0 to 1e-05 s/s"):
         OscillatorParams(drift=1.0)
-    with pytest.raises(ValueError, match="hardware: band_m = -1.0 is not within 0 to 1000"):
+    with pytest.raises(ValueError, match="band_m = -1 is not within 0 to 1000 m"):
         HardwareParams(band_m=-1.0)

@@ -187,5 +187,5 @@ def test_antenna_that_banks():
 
 
 def test_bad_parameters_are_refused():
-    with pytest.raises(ValueError, match="receiver: cn0_sigma_db = -1.0 is not within 0 to 10"):
+    with pytest.raises(ValueError, match="cn0_sigma_db = -1 is not within 0 to 10 dB"):
         ReceiverModel(cn0_sigma_db=-1.0)

@@ -19,7 +19,7 @@ from gbas_sim.flight.straight_in import StraightIn
 from gbas_sim.receivers.oscillators import OSCILLATORS
 from gbas_sim.receivers.receiver_model import IDEAL
 from gbas_sim.receivers.site_scene import Building, SceneParams
-from gbas_sim.scenario import ScenarioError, scenario_from_mapping, scenario_values
+from gbas_sim.scenario import ScenarioError, scenario_from_mapping
 from gbas_sim.world import World, WorldParams
 
 SITES = ((3840619.039, 715604.228, 5024909.863), (3840835.113, 714861.969, 5024848.587))
@@ -136,7 +136,7 @@ def test_scene_and_buildings_from_keys():
     (building,) = world.buildings
     assert building.east_m == 90.0
     assert building.heading_rad == pytest.approx(math.radians(30.0))
-    assert scenario_values(world, {})["sim.scene.antenna"] == "mla"
+    assert world.scene.antenna == "mla"
     assert scenario().scene is None
     assert len(World(world)) == 11
 
@@ -153,16 +153,16 @@ def test_preset_with_loops_and_clock_of_ones_own():
 @pytest.mark.parametrize(
     ("sim", "message"),
     [
-        ({"scene": {"ground": "marble"}}, "sim.scene: scene: ground = 'marble' is not one of metal, concrete"),
+        ({"scene": {"ground": "marble"}}, "sim.scene.ground = 'marble' is not one of , metal, concrete"),
         ({"scene": {"grass": 1}}, "sim.scene.grass is unknown; known are antenna, antenna_height_m, ground"),
-        ({"scene": {"antenna_height_m": 0.0}}, "antenna_height_m = 0.0 is not within 0.1 to 100"),
+        ({"scene": {"antenna_height_m": 0.0}}, "sim.scene.antenna_height_m = 0 is not within 0.1 to 100 m"),
         (
-            {"threats": {"a": {"kind": "building", "east_m": 0.0, "north_m": 0.0, "length_m": 0.0, "width_m": 1.0}}},
-            "sim.threats.a: height_m is missing",
+            {"threats": {"a": {"kind": "building", "east_m": 0.0, "north_m": 0.0, "length_m": 1.0, "width_m": 1.0}}},
+            "sim.threats.a.height_m is missing",
         ),
         (
             {"ground_receiver": {"preset": "gad_b", "oscillator": "sundial"}},
-            "receiver: oscillator = 'sundial' is not one of steady, tcxo",
+            "sim.ground_receiver.oscillator = 'sundial' is not one of steady, tcxo",
         ),
         (
             {"ground_receiver": {"preset": "gad_b", "tracking": {"spacing": 0.1}}},

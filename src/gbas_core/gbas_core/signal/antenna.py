@@ -11,14 +11,13 @@ powers from IS-GPS-200N 3.3.1.6, IS-GPS-705J 3.3.1.6 and Galileo OS SIS ICD 2.1,
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from itertools import pairwise
-from typing import Final, Literal, get_args
+from typing import Annotated, Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gbas_core.bounds import all_within, one_of
+from gbas_core.parameters import Parameter, parameters
 from gbas_core.record import FloatArray
 from gbas_core.satellites import IS_GPS, N_SATS
 from gbas_core.signals import L1, L2, L5, N_BANDS, WAVELENGTH_M
@@ -38,25 +37,14 @@ _OXYGEN_ZENITH_DB: Final = 0.035
 _OXYGEN_HEIGHT: Final = 6.0 / 6378.0
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class AntennaPattern:
-    """Gain by elevation, linear in dB between the points given.
+    """Gain by elevation, linear in dB between the points given."""
 
-    Attributes
-    ----------
-    name : str
-    elevation_deg : tuple of float
-        Ascending, from -90 to 90 [deg].
-    gain_dbic : tuple of float
-        Right-handed [dBic].
-    cross_dbic : tuple of float
-        Left-handed [dBic].
-    """
-
-    name: str
-    elevation_deg: tuple[float, ...]
-    gain_dbic: tuple[float, ...]
-    cross_dbic: tuple[float, ...]
+    name: Annotated[str, Parameter("name of the antenna")]
+    elevation_deg: Annotated[tuple[float, ...], Parameter("elevations from -90 to 90 degrees, ascending")]
+    gain_dbic: Annotated[tuple[float, ...], Parameter("right-handed gain", "dBic", -100.0, 30.0)]
+    cross_dbic: Annotated[tuple[float, ...], Parameter("left-handed gain", "dBic", -100.0, 30.0)]
 
     def __post_init__(self) -> None:
         elevations = self.elevation_deg
@@ -67,7 +55,6 @@ class AntennaPattern:
         for key in ("gain_dbic", "cross_dbic"):
             if len(getattr(self, key)) != len(elevations):
                 raise ValueError(f"antenna {self.name}: {key} has not as many values as elevation_deg")
-        all_within(f"antenna {self.name}", self, {"gain_dbic": (-100.0, 30.0), "cross_dbic": (-100.0, 30.0)})
 
     def gain_at_dbic(self, elevation_rad: ArrayLike) -> FloatArray:
         """Right-handed gain [dBic]."""
@@ -115,6 +102,7 @@ ANTENNAS: Final[dict[str, AntennaPattern]] = {
         ),
     )
 }
+ANTENNA: Final = Parameter("name of the antenna", choices=tuple(ANTENNAS))
 
 
 def oxygen_loss_db(elevation_rad: ArrayLike) -> FloatArray:
@@ -161,23 +149,12 @@ def slant_range_m(elevation_rad: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt(_ORBIT_RADIUS_M**2 - _EARTH_RADIUS_M**2 * (1.0 - sine**2)) - _EARTH_RADIUS_M * sine)
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class Cn0Curve:
-    """C/N0 that goes with the sine of the elevation.
+    """C/N0 that goes with the sine of the elevation; pairs are for L1 and L5. Ours."""
 
-    Attributes
-    ----------
-    zenith_dbhz, horizon_dbhz : (float, float)
-        On L1 and on L5 [dB-Hz]. Ours.
-    """
-
-    zenith_dbhz: tuple[float, float] = (50.0, 52.0)
-    horizon_dbhz: tuple[float, float] = (37.0, 39.0)
-
-    def __post_init__(self) -> None:
-        for key in ("zenith_dbhz", "horizon_dbhz"):
-            _pair("C/N0", key, getattr(self, key))
-        all_within("C/N0", self, {"zenith_dbhz": (0.0, 80.0), "horizon_dbhz": (0.0, 80.0)})
+    zenith_dbhz: Annotated[tuple[float, float], Parameter("at the zenith", "dB-Hz", 0.0, 80.0)] = (50.0, 52.0)
+    horizon_dbhz: Annotated[tuple[float, float], Parameter("at the horizon", "dB-Hz", 0.0, 80.0)] = (37.0, 39.0)
 
     def cn0_dbhz(self, elevation_rad: FloatArray, antenna_elevation_rad: FloatArray | None = None) -> FloatArray:
         """C/N0 ``(..., N_BANDS, N_SATS)``, as :meth:`LinkBudget.cn0_dbhz`; NaN on L2."""
@@ -188,27 +165,16 @@ class Cn0Curve:
         return cn0
 
 
-@dataclass(frozen=True, kw_only=True)
-class LinkBudget:
-    """C/N0 from received power, antenna gain and noise.
+_RECEIVED: Final = "at an isotropic right-handed antenna on the ground from the zenith"
 
-    Attributes
-    ----------
-    gps_dbw, galileo_dbw : (float, float)
-        What an isotropic right-handed antenna on the ground receives on L1 and on L5 from the zenith [dBW]. The
-        defaults are 2 dB above the guaranteed minimum of the interface documents: -158.5 (C/A), -154.0 (L5), -157.25
-        (E1), -155.25 (E5a).
-    beam : {"isoflux", "paper"}
-        What satellites send towards lower elevations: the same power density on the ground at all elevations, as their
-        antennas are shaped to, or the paper's eq (14), by which both distance and beam weaken it.
-    antenna : str
-        Name in :data:`ANTENNAS`.
-    noise_figure_db : float
-        Of the receiver with its cables [dB].
-    antenna_temperature_k : float
-        Sky and ground as the antenna sees them [K].
-    loss_db : float
-        Of correlation, quantisation and band limits [dB].
+
+@parameters
+class LinkBudget:
+    """C/N0 from received power, antenna gain and noise; pairs are for L1 and L5.
+
+    The received powers are 2 dB above the guaranteed minimum of the interface documents: -158.5 (C/A), -154.0 (L5),
+    -157.25 (E1), -155.25 (E5a). Beam ``isoflux``: the same power density on the ground at all elevations, as
+    satellites' antennas are shaped to; ``paper``: the paper's eq (14), by which both distance and beam weaken it.
 
     Source: Sabatini et al., eq (12) to (20).
 
@@ -218,30 +184,21 @@ class LinkBudget:
     noise temperature of the receiver. Here N_0 = k (T_antenna + 290 K (F - 1)).
     """
 
-    gps_dbw: tuple[float, float] = (-156.5, -152.0)
-    galileo_dbw: tuple[float, float] = (-155.25, -153.25)
-    beam: Beam = "isoflux"
-    antenna: str = "patch"
-    noise_figure_db: float = 3.0
-    antenna_temperature_k: float = 130.0
-    loss_db: float = 1.5
-
-    def __post_init__(self) -> None:
-        for key in ("gps_dbw", "galileo_dbw"):
-            _pair("link budget", key, getattr(self, key))
-        one_of("link budget", "beam", self.beam, get_args(Beam))
-        one_of("link budget", "antenna", self.antenna, ANTENNAS)
-        all_within(
-            "link budget",
-            self,
-            {
-                "gps_dbw": (-200.0, -100.0),
-                "galileo_dbw": (-200.0, -100.0),
-                "noise_figure_db": (0.0, 20.0),
-                "antenna_temperature_k": (1.0, 1000.0),
-                "loss_db": (0.0, 20.0),
-            },
-        )
+    gps_dbw: Annotated[tuple[float, float], Parameter(f"power of GPS {_RECEIVED}", "dBW", -200.0, -100.0)] = (
+        -156.5,
+        -152.0,
+    )
+    galileo_dbw: Annotated[tuple[float, float], Parameter(f"power of Galileo {_RECEIVED}", "dBW", -200.0, -100.0)] = (
+        -155.25,
+        -153.25,
+    )
+    beam: Annotated[Beam, Parameter("what satellites send towards lower elevations")] = "isoflux"
+    antenna: Annotated[str, ANTENNA] = "patch"
+    noise_figure_db: Annotated[float, Parameter("of the receiver with its cables", "dB", 0.0, 20.0)] = 3.0
+    antenna_temperature_k: Annotated[float, Parameter("sky and ground as the antenna sees them", "K", 1.0, 1000.0)] = (
+        130.0
+    )
+    loss_db: Annotated[float, Parameter("of correlation, quantisation and band limits", "dB", 0.0, 20.0)] = 1.5
 
     @property
     def noise_dbwphz(self) -> float:
@@ -277,8 +234,3 @@ class LinkBudget:
 
 
 Cn0Model = Cn0Curve | LinkBudget
-
-
-def _pair(owner: str, key: str, value: object) -> None:
-    if not (isinstance(value, tuple) and len(value) == 2):
-        raise ValueError(f"{owner}: {key} = {value!r} is not two numbers (L1, L5)")

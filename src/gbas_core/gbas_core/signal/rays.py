@@ -15,12 +15,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final, NamedTuple
+from typing import Annotated, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gbas_core.bounds import all_within, one_of
+from gbas_core.parameters import Parameter, parameters
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.signal.antenna import AntennaPattern
 from gbas_core.signal.discriminator import discriminator_errors
@@ -35,32 +35,14 @@ _EDGE: Final = 1e-9
 _CLEAR_M: Final = 1e-6  # a facet does not hide what touches it
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class Material:
-    """What reflects.
+    """What reflects; what a rough surface scatters is lost."""
 
-    Attributes
-    ----------
-    name : str
-    permittivity : float
-        Relative [-].
-    conductivity_spm : float
-        [S/m].
-    roughness_m : float
-        Standard deviation of its height [m]; what a rough surface scatters is lost.
-    """
-
-    name: str
-    permittivity: float
-    conductivity_spm: float
-    roughness_m: float = 0.0
-
-    def __post_init__(self) -> None:
-        all_within(
-            f"material {self.name}",
-            self,
-            {"permittivity": (1.0, 1000.0), "conductivity_spm": (0.0, 1e8), "roughness_m": (0.0, 10.0)},
-        )
+    name: Annotated[str, Parameter("name of the material")]
+    permittivity: Annotated[float, Parameter("relative", "-", 1.0, 1000.0)]
+    conductivity_spm: Annotated[float, Parameter("conductivity", "S/m", 0.0, 1e8)]
+    roughness_m: Annotated[float, Parameter("standard deviation of its height", "m", 0.0, 10.0)] = 0.0
 
 
 def circular_reflection(
@@ -101,32 +83,24 @@ MATERIALS: Final[dict[str, Material]] = {
         Material(name="fresh_water", permittivity=79.0, conductivity_spm=0.4),
     )
 }
+MATERIAL: Final = Parameter("name of the material", choices=tuple(MATERIALS))
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class Facet:
     """A flat piece that reflects on the side its normal points to, and hides from both.
 
-    Attributes
-    ----------
-    corner_m, first_m, second_m : (float, float, float)
-        A corner and the edges from it, east, north, up [m]; the normal is along first x second.
-    triangle : bool
-        Whether only the half next to the corner is there, rather than the parallelogram.
-    material : str
-        Name in :data:`MATERIALS`.
+    Positions are east, north, up; the normal is along first x second.
     """
 
-    corner_m: tuple[float, float, float]
-    first_m: tuple[float, float, float]
-    second_m: tuple[float, float, float]
-    triangle: bool = False
-    material: str = "concrete"
+    corner_m: Annotated[tuple[float, float, float], Parameter("a corner", "m")]
+    first_m: Annotated[tuple[float, float, float], Parameter("first edge from it", "m")]
+    second_m: Annotated[tuple[float, float, float], Parameter("second edge from it", "m")]
+    triangle: Annotated[bool, Parameter("only the half next to the corner, rather than the parallelogram")] = False
+    material: Annotated[str, MATERIAL] = "concrete"
 
     def __post_init__(self) -> None:
-        one_of("facet", "material", self.material, MATERIALS)
-        area = float(np.linalg.norm(np.cross(self.first_m, self.second_m)))
-        if not (np.isfinite(self.corner_m).all() and np.isfinite(area) and area > 0.0):
+        if not float(np.linalg.norm(np.cross(self.first_m, self.second_m))) > 0.0:
             raise ValueError(f"facet: corner_m = {self.corner_m!r} and its edges span no area")
 
 
@@ -210,23 +184,15 @@ class Rays(NamedTuple):
     amplitude: ComplexArray
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class Scene:
-    """What reflects and hides.
-
-    Attributes
-    ----------
-    facets : tuple of Facet
-    ground : str or None
-        Material of the plane at height 0, which reflects; without one the sky goes down to the nadir.
-    """
+    """What reflects and hides."""
 
     facets: tuple[Facet, ...] = ()
-    ground: str | None = "ground"
-
-    def __post_init__(self) -> None:
-        if self.ground is not None:
-            one_of("scene", "ground", self.ground, MATERIALS)
+    ground: Annotated[
+        str | None,
+        Parameter("material of the plane at height 0; none: the sky goes down to the nadir", choices=tuple(MATERIALS)),
+    ] = "ground"
 
     @cached_property
     def _planes(self) -> _Planes:

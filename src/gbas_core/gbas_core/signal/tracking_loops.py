@@ -13,13 +13,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Final, NamedTuple
+from typing import Annotated, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.integrate import simpson
 
-from gbas_core.bounds import all_within
+from gbas_core.parameters import Parameter, parameters
 from gbas_core.record import FloatArray
 from gbas_core.satellites import IS_GPS, N_SATS
 from gbas_core.signals import FREQUENCY_HZ, L1, L5, N_BANDS, SPEED_OF_LIGHT_MPS, WAVELENGTH_M
@@ -186,67 +186,40 @@ def dynamic_phase_rad(frequency_hz: float, jerk_mps3: float, bandwidth_hz: float
     return 2.0 * math.pi * frequency_hz / SPEED_OF_LIGHT_MPS * jerk_mps3 * (0.7845 / bandwidth_hz) ** 3
 
 
-@dataclass(frozen=True, kw_only=True)
+CODE_BANDWIDTH: Final = Parameter("one-sided noise bandwidth of the code loop", "Hz", 0.01, 10.0)
+CARRIER_BANDWIDTH: Final = Parameter("of the third-order Costas loop", "Hz", 0.1, 100.0)
+NOISE_SCALE: Final = Parameter("factor on all thermal noise; 0 switches it off", "-", 0.0, 100.0)
+
+
+@parameters
 class TrackingParams:
     """The loops of a receiver; triples are for :data:`SIGNALS`.
 
-    Attributes
-    ----------
-    spacing_chips : (float, float, float)
-        Early to late [chips].
-    front_end_hz : (float, float, float)
-        Two-sided bandwidths before correlation [Hz].
-    code_bandwidth_hz : float
-        One-sided noise bandwidth of the carrier-aided code loop; its noise has a correlation time of a quarter of the
-        inverse [Hz]. Known: at least 0.125 Hz in a GBAS (Annex 10 Vol. I, App. B 3.6.8.3.5.1).
-    carrier_bandwidth_hz, frequency_bandwidth_hz : float
-        Of the third-order Costas loop and of the frequency loop [Hz].
-    integration_s : float
-        Before detection, of all loops [s].
-    allan_deviation : float
-        Of the oscillator over the phase loop's time [-].
-    vibration_sensitivity_per_g, vibration_g2phz : float
-        Of the oscillator [1/g], and the flat spectrum it feels from 20 to 2000 Hz [g^2/Hz].
-    jerk_mps3 : float
-        Largest along a line of sight that the phase loop is to bear [m/s^3].
-    noise_scale : float
-        Factor on all thermal noise; 0 switches it off.
+    The code loop is aided by the carrier; its noise has a correlation time of a quarter of the inverse of its
+    bandwidth. Known: at least 0.125 Hz in a GBAS (Annex 10 Vol. I, App. B 3.6.8.3.5.1).
     """
 
-    spacing_chips: tuple[float, float, float] = (0.1, 0.1, 1.0)
-    front_end_hz: tuple[float, float, float] = (20.0e6, 20.0e6, 20.0e6)
-    code_bandwidth_hz: float = 0.25
-    carrier_bandwidth_hz: float = 15.0
-    frequency_bandwidth_hz: float = 2.0
-    integration_s: float = 0.02
-    allan_deviation: float = 1.0e-10
-    vibration_sensitivity_per_g: float = 1.0e-9
-    vibration_g2phz: float = 0.0
-    jerk_mps3: float = 0.0
-    noise_scale: float = 1.0
-
-    def __post_init__(self) -> None:
-        for key in ("spacing_chips", "front_end_hz"):
-            value = getattr(self, key)
-            if not (isinstance(value, tuple) and len(value) == len(SIGNALS)):
-                raise ValueError(f"tracking: {key} = {value!r} is not three numbers ({', '.join(SIGNALS)})")
-        all_within(
-            "tracking",
-            self,
-            {
-                "spacing_chips": (0.02, 1.0),
-                "front_end_hz": (1.0e6, 60.0e6),
-                "code_bandwidth_hz": (0.01, 10.0),
-                "carrier_bandwidth_hz": (0.1, 100.0),
-                "frequency_bandwidth_hz": (0.1, 100.0),
-                "integration_s": (0.001, 1.0),
-                "allan_deviation": (0.0, 1.0e-7),
-                "vibration_sensitivity_per_g": (0.0, 1.0e-6),
-                "vibration_g2phz": (0.0, 10.0),
-                "jerk_mps3": (0.0, 1000.0),
-                "noise_scale": (0.0, 100.0),
-            },
-        )
+    spacing_chips: Annotated[tuple[float, float, float], Parameter("early to late", "chips", 0.02, 1.0)] = (
+        0.1,
+        0.1,
+        1.0,
+    )
+    front_end_hz: Annotated[
+        tuple[float, float, float], Parameter("two-sided bandwidths before correlation", "Hz", 1.0e6, 60.0e6)
+    ] = (20.0e6, 20.0e6, 20.0e6)
+    code_bandwidth_hz: Annotated[float, CODE_BANDWIDTH] = 0.25
+    carrier_bandwidth_hz: Annotated[float, CARRIER_BANDWIDTH] = 15.0
+    frequency_bandwidth_hz: Annotated[float, Parameter("of the frequency loop", "Hz", 0.1, 100.0)] = 2.0
+    integration_s: Annotated[float, Parameter("before detection, of all loops", "s", 0.001, 1.0)] = 0.02
+    allan_deviation: Annotated[float, Parameter("of the oscillator over the phase loop's time", "-", 0.0, 1.0e-7)] = (
+        1.0e-10
+    )
+    vibration_sensitivity_per_g: Annotated[float, Parameter("of the oscillator", "1/g", 0.0, 1.0e-6)] = 1.0e-9
+    vibration_g2phz: Annotated[float, Parameter("flat spectrum it feels from 20 to 2000 Hz", "g^2/Hz", 0.0, 10.0)] = 0.0
+    jerk_mps3: Annotated[
+        float, Parameter("largest along a line of sight that the phase loop is to bear", "m/s^3", 0.0, 1000.0)
+    ] = 0.0
+    noise_scale: Annotated[float, NOISE_SCALE] = 1.0
 
     @property
     def code_correlation_s(self) -> float:

@@ -18,13 +18,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final, Literal, get_args
+from typing import Annotated, Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gbas_core.parameters import Parameter, parameters
 from gbas_core.record import FloatArray
-from gbas_core.satellites import N_SATS, SAT_INDEX
+from gbas_core.satellites import N_SATS, SAT_IDS, SAT_INDEX
 from gbas_sim.atmosphere.paths import Delay, Reference, SignalPaths, masked
 
 Edge = Literal["trailing", "leading"]
@@ -150,53 +151,27 @@ THREAT_SPACES: Final[dict[str, ThreatSpace]] = {
 }
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class _MovingLine:
     """A line that moves across the paths, and for which of them.
 
-    Attributes
-    ----------
-    direction_rad : float
-        Azimuth of motion at the station, clockwise from north [rad].
-    speed_mps : float
-    start_m, start_s : float
-        Where the line is in that direction from the station [m], at this time since the start [s]; before, it comes
-        from where its motion says.
-    reference : {"baseline", "ray", "pierce", "earth"}
-        How distance is measured, see :meth:`gbas_sim.atmosphere.paths.SignalPaths.along`.
-    satellites : tuple of str
-        Those affected, as ``"G07"``; empty is all.
-    threat_space : str
-        Name of the :data:`THREAT_SPACES` it has to belong to; empty is none.
+    It comes from where its motion says. Its place is measured as :meth:`gbas_sim.atmosphere.paths.SignalPaths.along`
+    does.
     """
 
-    direction_rad: float = 0.0
-    speed_mps: float = 0.0
-    start_m: float = 0.0
-    start_s: float = 0.0
-    reference: Reference = "ray"
-    satellites: tuple[str, ...] = ()
-    threat_space: str = ""
-
-    def _check(self, kind: str, bounds: dict[str, tuple[float, float]]) -> None:
-        line = {
-            "direction_rad": (-2.0 * math.pi, 2.0 * math.pi),
-            "speed_mps": (0.0, 10_000.0),
-            "start_m": (-1.0e7, 1.0e7),
-            "start_s": (-1.0e6, 1.0e6),
-        }
-        for key, (low, high) in (line | bounds).items():
-            value = getattr(self, key)
-            if not low <= value <= high:
-                raise ValueError(f"{kind}: {key} = {value!r} is not within {low:g} to {high:g}")
-        if self.reference not in get_args(Reference):
-            raise ValueError(f"{kind}: reference = {self.reference!r} is not one of {', '.join(get_args(Reference))}")
-        unknown = [name for name in self.satellites if name not in SAT_INDEX]
-        if unknown:
-            raise ValueError(f"{kind}: satellites = {unknown[0]!r} is not a satellite such as 'G07'")
-        if self.threat_space and self.threat_space not in THREAT_SPACES:
-            known = ", ".join(THREAT_SPACES)
-            raise ValueError(f"{kind}: threat_space = {self.threat_space!r} is not one of {known}")
+    direction_rad: Annotated[
+        float, Parameter("azimuth of motion at the station, clockwise from north", "deg", -360.0, 360.0)
+    ] = 0.0
+    speed_mps: Annotated[float, Parameter("speed of the motion", "m/s", 0.0, 10_000.0)] = 0.0
+    start_m: Annotated[
+        float, Parameter("where it is in that direction from the station at its time", "m", -1.0e7, 1.0e7)
+    ] = 0.0
+    start_s: Annotated[float, Parameter("its time, since the start", "s", -1.0e6, 1.0e6)] = 0.0
+    reference: Annotated[Reference, Parameter("how distance is measured")] = "ray"
+    satellites: Annotated[tuple[str, ...], Parameter("those affected, such as G07; empty is all", choices=SAT_IDS)] = ()
+    threat_space: Annotated[
+        str, Parameter("threat space it has to belong to; empty is none", choices=("", *THREAT_SPACES))
+    ] = ""
 
     @cached_property
     def affected(self) -> NDArray[np.bool_] | None:
@@ -225,47 +200,30 @@ class _MovingLine:
         return beyond if self.affected is None else beyond & self.affected
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class WedgeFront(_MovingLine):
     """A front: slant delay that grows linearly across a width, with no delay on one side and all of it on the other.
 
     With s the distance of a path in the direction of motion, and the line at s_0 at the time t_0, the slant delay is
     ``clip(g (s - s_0 - v (t - t_0)), 0, D)`` for the trailing edge of a storm, which moves away and leaves no delay
-    behind it, and ``clip(-g (s - s_0 - v (t - t_0)), 0, D)`` for a leading edge, which brings the delay.
-
-    Attributes
-    ----------
-    gradient : float
-        Slant gradient g on L1 [m/m]: 300 mm/km is 300e-6. Between two paths it is this over the distance that
-        `reference` measures.
-    width_m, max_delay_m : float or None
-        Width w and maximum slant delay D [m]; either follows from the other, and both must agree: D = g w.
-    edge : {"trailing", "leading"}
-
-    The other attributes are those of every moving line: direction_rad, speed_mps, start_m, start_s, reference,
-    satellites, threat_space.
+    behind it, and ``clip(-g (s - s_0 - v (t - t_0)), 0, D)`` for a leading edge, which brings the delay. Between two
+    paths the gradient is its value over the distance that `reference` measures. Width w and maximum delay D follow from
+    each other, and must agree where both are given: D = g w.
     """
 
-    gradient: float
-    width_m: float | None = None
-    max_delay_m: float | None = None
-    edge: Edge = "trailing"
+    kind: Annotated[Literal["front"], Parameter("kind of the threat")] = "front"
+    gradient: Annotated[float, Parameter("slant gradient on L1; 300 mm/km is 300e-6", "m/m", 1e-9, 0.1)]
+    width_m: Annotated[float | None, Parameter("width of the slope", "m", 1.0, 1.0e7)] = None
+    max_delay_m: Annotated[float | None, Parameter("maximum slant delay", "m", 1e-3, 1000.0)] = None
+    edge: Annotated[Edge, Parameter("which edge of the storm it is")] = "trailing"
 
     def __post_init__(self) -> None:
-        given = {
-            key: bound
-            for key, bound in (("width_m", (1.0, 1.0e7)), ("max_delay_m", (1e-3, 1000.0)))
-            if getattr(self, key) is not None
-        }
-        if not given:
-            raise ValueError("front: width_m and max_delay_m are both missing")
-        self._check("front", {"gradient": (1e-9, 0.1)} | given)
-        if self.edge not in get_args(Edge):
-            raise ValueError(f"front: edge = {self.edge!r} is not one of {', '.join(get_args(Edge))}")
-        if len(given) == 2 and abs(self.gradient * self.wide_m / self.deep_m - 1.0) > _CONSISTENCY:
+        if self.width_m is None and self.max_delay_m is None:
+            raise ValueError("width_m and max_delay_m are both missing")
+        both = self.width_m is not None and self.max_delay_m is not None
+        if both and abs(self.gradient * self.wide_m / self.deep_m - 1.0) > _CONSISTENCY:
             raise ValueError(
-                f"front: max_delay_m = {self.max_delay_m!r} is not gradient times width_m = "
-                f"{self.gradient * self.wide_m:g}"
+                f"max_delay_m = {self.max_delay_m!r} is not gradient times width_m = {self.gradient * self.wide_m:g}"
             )
         if self.threat_space:
             values = {"speed_mps": self.speed_mps, "gradient": self.gradient, "width_m": self.wide_m}
@@ -294,42 +252,28 @@ class WedgeFront(_MovingLine):
         return masked(_on_satellites(front, paths), self.affected)
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class PlasmaBubble(_MovingLine):
     """A depletion: slant delay that falls by a depth across one wall, stays low, and rises again across another.
 
     Outside, the delay is the depth: that of the background the bubble is taken from, so that no delay is negative. It
-    is the same for all receivers and does not concern differential positions.
-
-    Attributes
-    ----------
-    depth_m : float
-        Fall of the slant delay on L1 [m].
-    front_wall_m, back_wall_m : float
-        Widths of the walls, the one that comes first and the other [m].
-    floor_m : float
-        Width between the walls [m].
-    direction_rad : float
-        Azimuth of the drift [rad]; bubbles drift east at night, along the magnetic equator.
-
-    The line is the outer edge of the front wall. The other attributes are those of every moving line: speed_mps,
-    start_m, start_s, reference, satellites, threat_space.
+    is the same for all receivers and does not concern differential positions. The line is the outer edge of the wall
+    that comes first. Bubbles drift east at night, along the magnetic equator.
 
     Source: Yoon, Lee, Pullen et al., NAVIGATION 64 (2017), pp. 309-321 (depth, walls, drift); the trapezoid is ours.
     """
 
-    depth_m: float
-    front_wall_m: float = 50_000.0
-    back_wall_m: float = 50_000.0
-    floor_m: float = 50_000.0
-    direction_rad: float = 0.5 * math.pi
-    speed_mps: float = 100.0
+    kind: Annotated[Literal["bubble"], Parameter("kind of the threat")] = "bubble"
+    depth_m: Annotated[float, Parameter("fall of the slant delay on L1", "m", 1e-3, 1000.0)]
+    front_wall_m: Annotated[float, Parameter("width of the wall that comes first", "m", 1.0, 1.0e7)] = 50_000.0
+    back_wall_m: Annotated[float, Parameter("width of the other", "m", 1.0, 1.0e7)] = 50_000.0
+    floor_m: Annotated[float, Parameter("width between the walls", "m", 0.0, 1.0e7)] = 50_000.0
+    direction_rad: Annotated[float, Parameter("azimuth of the drift", "deg", -360.0, 360.0)] = 0.5 * math.pi
+    speed_mps: Annotated[float, Parameter("speed of the drift", "m/s", 0.0, 10_000.0)] = 100.0
 
     def __post_init__(self) -> None:
-        walls = {"front_wall_m": (1.0, 1.0e7), "back_wall_m": (1.0, 1.0e7)}
-        self._check("bubble", {"depth_m": (1e-3, 1000.0), "floor_m": (0.0, 1.0e7)} | walls)
         if self.threat_space:
-            values = {key: getattr(self, key) for key in ("speed_mps", "depth_m", *walls)}
+            values = {key: getattr(self, key) for key in ("speed_mps", "depth_m", "front_wall_m", "back_wall_m")}
             THREAT_SPACES[self.threat_space].check("bubble", values | {"gradient": self._steepest()})
 
     @property

@@ -10,68 +10,45 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final, get_args
+from typing import Annotated, Final, Literal
 
 import numpy as np
 
+from gbas_core.parameters import Parameter, parameters
 from gbas_core.record import FloatArray
 from gbas_core.satellites import N_SATS
-from gbas_sim.atmosphere.paths import Delay, Reference, SignalPaths
+from gbas_sim.atmosphere.paths import Delay, SignalPaths
 
 _STREAM: Final = 20  # second word of the generator's key
 _DAY_S: Final = 86_400.0
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class IonosphereParams:
     """A quiet ionosphere.
 
-    Attributes
-    ----------
-    night_delay_m : float
-        Vertical delay at night [m]; Klobuchar's 5 ns.
-    day_delay_m : float
-        What the day adds at its height [m].
-    peak_local_s : float
-        Local solar time of the height of the day [s]; Klobuchar's 14 h.
-    period_s : float
-        Of the cosine whose positive half is the day [s].
-    sigma_vig : float
-        Standard deviation of the vertical gradient of each satellite, in any direction [m/m]. Known: 4 mm/km is what
-        stations broadcast at middle latitudes (Lee, Pullen, Datta-Barua, Enge, J. Aircraft 44 (2007), pp. 1662-1669).
-    gradient_reference : {"baseline", "ray", "pierce"}
-        How the distance is measured over which the gradient acts, see
-        :meth:`gbas_sim.atmosphere.paths.SignalPaths.along`. With "baseline" the differential delay is the standard's:
-        F_pp sigma_vig x.
+    Known: a gradient of 4 mm/km is what stations broadcast at middle latitudes (Lee, Pullen, Datta-Barua, Enge, J.
+    Aircraft 44 (2007), pp. 1662-1669). With the reference "baseline" the differential delay is the standard's: F_pp
+    sigma_vig x; see :meth:`gbas_sim.atmosphere.paths.SignalPaths.along`.
 
-    Source of the day: Klobuchar, IEEE Trans. AES-23 (1987), pp. 325-331; IS-GPS-200N 20.3.3.5.2.5. The half cosine is
-    taken whole, not as the message's series of three terms, so that the delay is continuous at its ends; amplitude and
-    period are constants.
+    Source of the day: Klobuchar, IEEE Trans. AES-23 (1987), pp. 325-331; IS-GPS-200N 20.3.3.5.2.5: 5 ns at night, the
+    height of the day at 14 h. The half cosine is taken whole, not as the message's series of three terms, so that the
+    delay is continuous at its ends; amplitude and period are constants.
     """
 
-    night_delay_m: float = 1.5
-    day_delay_m: float = 4.5
-    peak_local_s: float = 50_400.0
-    period_s: float = 100_800.0
-    sigma_vig: float = 4.0e-6
-    gradient_reference: Reference = "baseline"
-
-    def __post_init__(self) -> None:
-        bounds = {
-            "night_delay_m": (0.0, 50.0),
-            "day_delay_m": (0.0, 100.0),
-            "peak_local_s": (0.0, _DAY_S),
-            "period_s": (20_000.0, 2.0 * _DAY_S),
-            "sigma_vig": (0.0, 1.0e-3),
-        }
-        for key, (low, high) in bounds.items():
-            value = getattr(self, key)
-            if not low <= value <= high:
-                raise ValueError(f"ionosphere: {key} = {value!r} is not within {low:g} to {high:g}")
-        if self.gradient_reference not in get_args(Reference) or self.gradient_reference == "earth":
-            raise ValueError(
-                f"ionosphere: gradient_reference = {self.gradient_reference!r} is not 'baseline', 'ray' or 'pierce'"
-            )
+    night_delay_m: Annotated[float, Parameter("vertical delay at night", "m", 0.0, 50.0)] = 1.5
+    day_delay_m: Annotated[float, Parameter("what the day adds at its height", "m", 0.0, 100.0)] = 4.5
+    peak_local_s: Annotated[float, Parameter("local solar time of the height of the day", "s", 0.0, _DAY_S)] = 50_400.0
+    period_s: Annotated[
+        float, Parameter("of the cosine whose positive half is the day", "s", 20_000.0, 2.0 * _DAY_S)
+    ] = 100_800.0
+    sigma_vig: Annotated[
+        float,
+        Parameter("standard deviation of each satellite's vertical gradient in any direction", "m/m", 0.0, 1.0e-3),
+    ] = 4.0e-6
+    gradient_reference: Annotated[
+        Literal["baseline", "ray", "pierce"], Parameter("how the distance is measured over which the gradient acts")
+    ] = "baseline"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -22,13 +22,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Final
+from typing import Annotated, Final
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaincinv, ndtr
 
 from gbas_core.gnss.gpstime import epoch_key
+from gbas_core.parameters import Parameter, parameters
 from gbas_core.record import FloatArray
 from gbas_core.satellites import N_SATS
 from gbas_core.signals import IONO_RATIO
@@ -60,72 +61,60 @@ _SMALLEST_S4: Final = 0.01  # below, the fading is 0.1 dB at most and left out
 _DEEPEST: Final = 1e-4
 
 
-@dataclass(frozen=True, kw_only=True)
+_LATITUDE: Final = ("deg", 0.0, 90.0)
+_BELL: Final = ("deg", math.degrees(1e-3), math.degrees(1e3))
+_ZENITH: Final = "on L1 at the zenith"
+
+
+@parameters
 class ScintillationParams:
     """Climate of scintillation, and what it does to receivers.
 
-    Attributes
-    ----------
-    equatorial_s4 : float
-        S4 on L1 at the zenith, on the crests at their hour [-]; 0 switches them off.
-    latitude_shift_rad : float
-        Added to the latitude in the dipole's field, north positive, to have the site's dip latitude [rad].
-    crest_latitude_rad, crest_width_rad : float
-        Magnetic latitude of the crests north and south, and the standard deviation of their bell curves [rad].
-    equatorial_local_s, equatorial_width_s : float
-        Local solar time of the height, and the standard deviation [s].
-    auroral_sigma_phi_rad : float
-        Standard deviation of the phase on L1 at the zenith, in the oval at its hour [rad]; 0 switches it off.
-    oval_latitude_rad, oval_width_rad, auroral_local_s, auroral_width_s : float
-        As for the crests.
-    loss_rate_hz : float
-        Losses of lock a second and satellite at S4 = 1, or at sigma_phi = 1 rad; it goes with S4^2 + sigma_phi^2.
-    mean_loss_s : float
-        Mean duration of a loss [s].
-    common_share : float
-        Share of the losses that strike all receivers at once, 0 to 1.
-    correlation_s : float
-        Time over which the fading becomes independent [s].
+    Crests (equatorial S4) and oval (auroral sigma_phi) have bell curves in magnetic latitude and in local solar time.
+    Losses of lock go with S4^2 + sigma_phi^2.
     """
 
-    equatorial_s4: float = 0.7
-    latitude_shift_rad: float = 0.0
-    crest_latitude_rad: float = math.radians(15.0)
-    crest_width_rad: float = math.radians(8.0)
-    equatorial_local_s: float = 21.5 * 3600.0
-    equatorial_width_s: float = 1.5 * 3600.0
-    auroral_sigma_phi_rad: float = 0.3
-    oval_latitude_rad: float = math.radians(67.0)
-    oval_width_rad: float = math.radians(4.0)
-    auroral_local_s: float = 0.0
-    auroral_width_s: float = 4.0 * 3600.0
-    loss_rate_hz: float = 0.02
-    mean_loss_s: float = 3.0
-    common_share: float = 0.5
-    correlation_s: float = 1.0
-
-    def __post_init__(self) -> None:
-        bounds = {
-            "equatorial_s4": (0.0, LARGEST_INDEX),
-            "latitude_shift_rad": (-0.5, 0.5),
-            "crest_latitude_rad": (0.0, 0.5 * math.pi),
-            "crest_width_rad": (1e-3, 1e3),
-            "equatorial_local_s": (0.0, _DAY_S),
-            "equatorial_width_s": (1.0, 1e9),
-            "auroral_sigma_phi_rad": (0.0, LARGEST_INDEX),
-            "oval_latitude_rad": (0.0, 0.5 * math.pi),
-            "oval_width_rad": (1e-3, 1e3),
-            "auroral_local_s": (0.0, _DAY_S),
-            "auroral_width_s": (1.0, 1e9),
-            "loss_rate_hz": (0.0, 1.0),
-            "mean_loss_s": (0.01, 0.25 * _BLOCK_S),
-            "common_share": (0.0, 1.0),
-            "correlation_s": (0.1, _BLOCK_S),
-        }
-        for key, (low, high) in bounds.items():
-            value = getattr(self, key)
-            if not low <= value <= high:
-                raise ValueError(f"scintillation: {key} = {value!r} is not within {low:g} to {high:g}")
+    equatorial_s4: Annotated[
+        float, Parameter(f"S4 {_ZENITH}, on the crests at their hour; 0 switches them off", "-", 0.0, LARGEST_INDEX)
+    ] = 0.7
+    latitude_shift_rad: Annotated[
+        float,
+        Parameter(
+            "added to the latitude in the dipole's field, north positive, to have the site's dip latitude",
+            "deg",
+            math.degrees(-0.5),
+            math.degrees(0.5),
+        ),
+    ] = 0.0
+    crest_latitude_rad: Annotated[float, Parameter("magnetic latitude of the crests north and south", *_LATITUDE)] = (
+        math.radians(15.0)
+    )
+    crest_width_rad: Annotated[float, Parameter("standard deviation of the crests", *_BELL)] = math.radians(8.0)
+    equatorial_local_s: Annotated[float, Parameter("local solar time of the crests", "s", 0.0, _DAY_S)] = 21.5 * 3600.0
+    equatorial_width_s: Annotated[float, Parameter("standard deviation of that time", "s", 1.0, 1e9)] = 1.5 * 3600.0
+    auroral_sigma_phi_rad: Annotated[
+        float,
+        Parameter(
+            f"standard deviation of the phase {_ZENITH}, in the oval at its hour; 0 switches it off",
+            "deg",
+            0.0,
+            math.degrees(LARGEST_INDEX),
+        ),
+    ] = 0.3
+    oval_latitude_rad: Annotated[float, Parameter("magnetic latitude of the oval", *_LATITUDE)] = math.radians(67.0)
+    oval_width_rad: Annotated[float, Parameter("standard deviation of the oval", *_BELL)] = math.radians(4.0)
+    auroral_local_s: Annotated[float, Parameter("local solar time of the oval", "s", 0.0, _DAY_S)] = 0.0
+    auroral_width_s: Annotated[float, Parameter("standard deviation of that time", "s", 1.0, 1e9)] = 4.0 * 3600.0
+    loss_rate_hz: Annotated[
+        float, Parameter("losses of lock a second and satellite at S4 = 1, or at sigma_phi = 1 rad", "1/s", 0.0, 1.0)
+    ] = 0.02
+    mean_loss_s: Annotated[float, Parameter("mean duration of a loss", "s", 0.01, 0.25 * _BLOCK_S)] = 3.0
+    common_share: Annotated[
+        float, Parameter("share of the losses that strike all receivers at once", "-", 0.0, 1.0)
+    ] = 0.5
+    correlation_s: Annotated[float, Parameter("time over which the fading becomes independent", "s", 0.1, _BLOCK_S)] = (
+        1.0
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

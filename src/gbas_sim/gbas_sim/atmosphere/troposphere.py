@@ -10,11 +10,11 @@ Weather that the correction knows nothing of is a :class:`WeatherBox`: a body of
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Final
+from typing import Annotated, Final, Literal
 
 import numpy as np
 
+from gbas_core.parameters import Parameter, parameters
 from gbas_core.record import FloatArray
 from gbas_sim.atmosphere.paths import Delay, SignalPaths
 
@@ -26,34 +26,18 @@ _DRY_K_PER_HPA: Final = 77.6
 _WET_K2_PER_HPA: Final = 3.73e5
 
 
-@dataclass(frozen=True, kw_only=True)
+REFRACTIVITY: Final = Parameter("at the reference height; 0 is a vacuum", "N units", 0.0, 800.0)
+SCALE_HEIGHT: Final = Parameter("height over which refractivity falls to 1/e", "m", 100.0, 30_000.0)
+REFERENCE_HEIGHT: Final = Parameter("reference height above the ellipsoid", "m", -1000.0, 20_000.0)
+
+
+@parameters
 class Troposphere:
-    """Exponential refractivity.
+    """Exponential refractivity."""
 
-    Attributes
-    ----------
-    refractivity : float
-        At the reference height [N units]; 0 is a vacuum.
-    scale_height_m : float
-        Height over which it falls to 1/e [m].
-    reference_height_m : float
-        Above the ellipsoid [m].
-    """
-
-    refractivity: float = 0.0
-    scale_height_m: float = 7900.0
-    reference_height_m: float = 0.0
-
-    def __post_init__(self) -> None:
-        bounds = {
-            "refractivity": (0.0, 800.0),
-            "scale_height_m": (100.0, 30_000.0),
-            "reference_height_m": (-1000.0, 20_000.0),
-        }
-        for key, (low, high) in bounds.items():
-            value = getattr(self, key)
-            if not low <= value <= high:
-                raise ValueError(f"troposphere: {key} = {value!r} is not within {low:g} to {high:g}")
+    refractivity: Annotated[float, REFRACTIVITY] = 0.0
+    scale_height_m: Annotated[float, SCALE_HEIGHT] = 7900.0
+    reference_height_m: Annotated[float, REFERENCE_HEIGHT] = 0.0
 
     @classmethod
     def from_weather(
@@ -109,26 +93,12 @@ class Troposphere:
         return Delay(delay_m=delay_m, rate_mps=-delay_m * (thinning + sine * paths.sin_elevation_rate / squared))
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class WeatherBox:
     """A body of air between two heights and two vertical walls, of another refractivity than its surroundings.
 
     A weather wall reaches from the ground up and moves over the station; a duct is a thin layer above the ground that
     does not end. Air and ground are in one horizontal plane: over 20 km the Earth falls away from it by 31 m.
-
-    Attributes
-    ----------
-    excess_refractivity : float
-        Over that of the surroundings [N units].
-    base_m, top_m : float
-        Above the station's horizontal plane [m].
-    direction_rad : float
-        Azimuth of motion, and the direction across the walls, clockwise from north [rad].
-    start_m, start_s : float
-        Distance of the front wall from the station in that direction [m], at this time since the start [s].
-    thickness_m : float
-        From the front wall back to the other [m].
-    speed_mps : float
 
     Notes
     -----
@@ -136,32 +106,23 @@ class WeatherBox:
     ITM 2011 (weather wall). Rays are straight; the delay is 1e-6 N over the length of each ray within the body.
     """
 
-    excess_refractivity: float = 30.0
-    base_m: float = 0.0
-    top_m: float = 3000.0
-    direction_rad: float = 0.0
-    start_m: float = 0.0
-    start_s: float = 0.0
-    thickness_m: float = 1.0e6
-    speed_mps: float = 0.0
+    kind: Annotated[Literal["weather"], Parameter("kind of the threat")] = "weather"
+    excess_refractivity: Annotated[float, Parameter("over that of the surroundings", "N units", -200.0, 200.0)] = 30.0
+    base_m: Annotated[float, Parameter("lower end above the station's horizontal plane", "m", -1000.0, 20_000.0)] = 0.0
+    top_m: Annotated[float, Parameter("upper end above that plane", "m", -1000.0, 20_000.0)] = 3000.0
+    direction_rad: Annotated[
+        float, Parameter("azimuth of motion and across the walls, clockwise from north", "deg", -360.0, 360.0)
+    ] = 0.0
+    start_m: Annotated[
+        float, Parameter("distance of the front wall from the station in that direction", "m", -1.0e7, 1.0e7)
+    ] = 0.0
+    start_s: Annotated[float, Parameter("when it is there, since the start", "s", -1.0e6, 1.0e6)] = 0.0
+    thickness_m: Annotated[float, Parameter("from the front wall back to the other", "m", 1.0, 1.0e7)] = 1.0e6
+    speed_mps: Annotated[float, Parameter("speed of the motion", "m/s", 0.0, 100.0)] = 0.0
 
     def __post_init__(self) -> None:
-        bounds = {
-            "excess_refractivity": (-200.0, 200.0),
-            "base_m": (-1000.0, 20_000.0),
-            "top_m": (-1000.0, 20_000.0),
-            "direction_rad": (-2.0 * math.pi, 2.0 * math.pi),
-            "start_m": (-1.0e7, 1.0e7),
-            "start_s": (-1.0e6, 1.0e6),
-            "thickness_m": (1.0, 1.0e7),
-            "speed_mps": (0.0, 100.0),
-        }
-        for key, (low, high) in bounds.items():
-            value = getattr(self, key)
-            if not low <= value <= high:
-                raise ValueError(f"weather: {key} = {value!r} is not within {low:g} to {high:g}")
         if self.top_m <= self.base_m:
-            raise ValueError(f"weather: top_m = {self.top_m!r} is not above base_m = {self.base_m!r}")
+            raise ValueError(f"top_m = {self.top_m!r} is not above base_m = {self.base_m!r}")
 
     def delay(self, paths: SignalPaths) -> Delay:
         """Slant delay and its rate; NaN for satellites below the horizon.

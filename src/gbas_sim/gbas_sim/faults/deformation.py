@@ -11,13 +11,12 @@ techniques for robust mitigation of threats to GPS signal quality, Stanford (200
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import lru_cache
-from typing import Final, NamedTuple
+from typing import Annotated, Final, NamedTuple
 
 import numpy as np
 
-from gbas_core.bounds import all_within
+from gbas_core.parameters import Parameter, parameters
 from gbas_core.record import FloatArray
 from gbas_core.signal.tracking_loops import MODULATIONS, SIGNALS, Modulation, TrackingParams
 
@@ -26,27 +25,19 @@ _CHIPS: Final = 64
 _FILTER_ORDER: Final = 6
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class Deformation:
     """A deformed signal; all zero but the damping is none.
 
-    Attributes
-    ----------
-    lag_chips : float
-        How much later falling edges come, below 0 earlier [chips]. Known: up to 0.12 (models A and C).
-    ring_hz : float
-        Frequency of the ringing; 0 is none [Hz]. Known: 4 to 17 MHz (B), 7.3 to 13 MHz (C).
-    damping_neperps : float
-        How fast it fades [neper/s]. Known: 0.8 to 8.8 million.
+    Known: lags up to 0.12 chips (models A and C), ringing of 4 to 17 MHz (B) or 7.3 to 13 MHz (C), damping of 0.8 to
+    8.8 million.
     """
 
-    lag_chips: float = 0.0
-    ring_hz: float = 0.0
-    damping_neperps: float = 8.8e6
-
-    def __post_init__(self) -> None:
-        bounds = {"lag_chips": (-0.5, 0.5), "ring_hz": (0.0, 50.0e6), "damping_neperps": (1.0e5, 1.0e8)}
-        all_within("deformation", self, bounds)
+    lag_chips: Annotated[float, Parameter("how much later falling edges come, below 0 earlier", "chips", -0.5, 0.5)] = (
+        0.0
+    )
+    ring_hz: Annotated[float, Parameter("frequency of the ringing; 0 is none", "Hz", 0.0, 50.0e6)] = 0.0
+    damping_neperps: Annotated[float, Parameter("how fast it fades", "neper/s", 1.0e5, 1.0e8)] = 8.8e6
 
 
 class Correlator(NamedTuple):

@@ -9,19 +9,22 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, Final, Literal, NamedTuple, get_args
+from typing import Annotated, Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic.types import AllowInfNan
 
-from gbas_core.bounds import all_within, one_of, within
+from gbas_core.parameters import Parameter, parameters
 from gbas_core.record import BoolArray, FloatArray
-from gbas_core.satellites import N_SATS, SAT_INDEX
+from gbas_core.satellites import N_SATS, SAT_IDS, SAT_INDEX
 from gbas_core.signal.tracking_loops import TrackingParams
 from gbas_core.signals import N_BANDS, WAVELENGTH_M
 
 IndexArray = NDArray[np.intp]
 After = Literal["clear", "hold"]
+
+Band = Literal["L1", "L5"]
 
 RECEIVERS: Final = ("rr1", "rr2", "rr3", "rr4", "airborne")
 """Names of receivers, as in the topics."""
@@ -131,23 +134,17 @@ class Moment(NamedTuple):
         return np.array([not names or listener.name in names for listener in self.listeners])
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class Window:
-    """When a fault is there.
+    """When a fault is there."""
 
-    Attributes
-    ----------
-    start_s, end_s : float
-        From and up to when [s].
-    """
-
-    kind: ClassVar[str]
-
-    start_s: float
-    end_s: float = math.inf
+    kind: Annotated[str, Parameter("kind of the fault")]
+    start_s: Annotated[float, Parameter("from when", "s", -_LARGEST_S, _LARGEST_S)]
+    end_s: Annotated[
+        float, AllowInfNan(True), Parameter("up to when; for good unless given", "s", -_LARGEST_S, math.inf)
+    ] = math.inf
 
     def __post_init__(self) -> None:
-        within(self.owner, "start_s", self.start_s, -_LARGEST_S, _LARGEST_S)
         if not self.end_s > self.start_s:
             raise ValueError(f"{self.owner}: end_s = {self.end_s!r} is not after start_s = {self.start_s!r}")
 
@@ -166,30 +163,19 @@ class Window:
         return np.asarray((since_s >= self.start_s) & (since_s < self.end_s))
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class Growing(Window):
-    """A fault whose size is ``step + ramp t + acceleration t^2 / 2``, t since its start.
+    """A fault whose size is ``step + ramp t + acceleration t^2 / 2``, t since its start."""
 
-    Attributes
-    ----------
-    step_m, ramp_mps, acceleration_mps2 : float
-        [m], [m/s], [m/s^2].
-    after : {"clear", "hold"}
-        Whether the size falls to 0 at the end, or stays as it was then.
-    """
-
-    step_m: float = 0.0
-    ramp_mps: float = 0.0
-    acceleration_mps2: float = 0.0
-    after: After = "clear"
+    step_m: Annotated[float, Parameter("size at the start", "m", -1e6, 1e6)] = 0.0
+    ramp_mps: Annotated[float, Parameter("growth", "m/s", -1e4, 1e4)] = 0.0
+    acceleration_mps2: Annotated[float, Parameter("growth of the growth", "m/s^2", -1e3, 1e3)] = 0.0
+    after: Annotated[After, Parameter("the size at the end falls to 0 (clear) or stays as it was (hold)")] = "clear"
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        bounds = {"step_m": (-1e6, 1e6), "ramp_mps": (-1e4, 1e4), "acceleration_mps2": (-1e3, 1e3)}
-        all_within(self.owner, self, bounds)
         if self.step_m == self.ramp_mps == self.acceleration_mps2 == 0.0:
             raise ValueError(f"{self.owner}: step_m, ramp_mps and acceleration_mps2 are all 0: nothing would happen")
-        one_of(self.owner, "after", self.after, get_args(After))
 
     def size(self, since_s: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Size and its rate at times ``(...)`` [m], [m/s]; the step itself has no rate."""
@@ -201,22 +187,11 @@ class Growing(Window):
         return np.where(shown, size, 0.0), np.where(active, rate, 0.0)
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class SatelliteFault(Window):
-    """A fault of one satellite.
+    """A fault of one satellite."""
 
-    Attributes
-    ----------
-    satellite : str
-        Such as ``"G05"``.
-    """
-
-    satellite: str
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.satellite not in SAT_INDEX:
-            raise ValueError(f"{self.owner}: satellite = {self.satellite!r} is not one of G01 to G32 and E01 to E36")
+    satellite: Annotated[str, Parameter("satellite, such as G05", choices=SAT_IDS)]
 
     @property
     def index(self) -> int:

@@ -9,7 +9,7 @@ that a receiver's codes and carriers share are :func:`clock_jumps_s`, frozen out
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
+from typing import Final, get_args
 
 from gbas_core.ranging.fault_modes import FAULT_MODES
 from gbas_core.record import FloatArray
@@ -39,29 +39,26 @@ __all__ = [
     "BROADCAST_FIELDS", "FAULT_MODES", "RECEIVERS", "RECEIVER_FAULTS", "SATELLITE_FAULTS",
     "BroadcastFault", "ClockFault", "ClockJump", "CodeCarrierDivergence", "CycleSlip", "ExcessiveAcceleration",
     "FrozenOutput", "Growing", "Listener", "LossOfLock", "LowPower", "Moment", "NoiseBurst", "OrbitFault", "RangeFault",
-    "ReceiverFault", "SatelliteFault", "SignalDeformation", "SignalEffect", "Window",
+    "ReceiverFault", "ReceiverKinds", "SatelliteFault", "SatelliteKinds", "SignalDeformation", "SignalEffect", "Window",
     "clock_jumps_s", "displaced", "receiver_effect", "signal_effect", "source_epochs", "with_wrong_broadcasts",
 ]  # fmt: skip
 
-SATELLITE_FAULTS: Final[dict[str, type[SatelliteFault]]] = {
-    kind.kind: kind
-    for kind in (
-        CodeCarrierDivergence,
-        ExcessiveAcceleration,
-        ClockFault,
-        OrbitFault,
-        BroadcastFault,
-        LowPower,
-        SignalDeformation,
-        CycleSlip,
-        LossOfLock,
-    )
-}
+SatelliteKinds = (
+    CodeCarrierDivergence
+    | ExcessiveAcceleration
+    | ClockFault
+    | OrbitFault
+    | BroadcastFault
+    | LowPower
+    | SignalDeformation
+    | CycleSlip
+    | LossOfLock
+)
+ReceiverKinds = RangeFault | NoiseBurst | FrozenOutput | ClockJump
+SATELLITE_FAULTS: Final[dict[str, type[SatelliteFault]]] = {kind.kind: kind for kind in get_args(SatelliteKinds)}
 """Kinds of satellites' faults by name."""
 
-RECEIVER_FAULTS: Final[dict[str, type[ReceiverFault]]] = {
-    kind.kind: kind for kind in (RangeFault, NoiseBurst, FrozenOutput, ClockJump)
-}
+RECEIVER_FAULTS: Final[dict[str, type[ReceiverFault]]] = {kind.kind: kind for kind in get_args(ReceiverKinds)}
 """Kinds of receivers' faults by name."""
 
 

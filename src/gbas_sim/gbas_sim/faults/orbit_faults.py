@@ -8,47 +8,38 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import ClassVar, Final
+from dataclasses import replace
+from typing import Annotated, Final, Literal
 
 import numpy as np
 
-from gbas_core.bounds import all_within, one_of
 from gbas_core.gnss.ephemeris import FIELDS, Ephemeris
 from gbas_core.gnss.frames import EARTH_RATE_RADPS
 from gbas_core.gnss.gpstime import add_seconds, seconds_between
 from gbas_core.gnss.orbits import SatelliteState
+from gbas_core.parameters import Parameter, parameters
 from gbas_core.record import FloatArray
 from gbas_core.satellites import IS_GPS, N_SATS
 from gbas_sim.faults.fault_base import SatelliteFault
 
+_ACROSS: Final = "across it (towards the angular momentum)"
 
-@dataclass(frozen=True, kw_only=True)
+
+@parameters
 class OrbitFault(SatelliteFault):
-    """The satellite leaves the orbit it broadcasts: constant offsets and rates along its own axes.
+    """The satellite leaves the orbit it broadcasts: constant offsets and rates along its axes, from the start on."""
 
-    Attributes
-    ----------
-    along_m, cross_m, radial_m : float
-        Along the track, across it (towards the angular momentum) and up, from the start on [m].
-    along_mps, cross_mps, radial_mps : float
-        Growth since the start [m/s].
-    """
-
-    kind: ClassVar[str] = "orbit"
-
-    along_m: float = 0.0
-    cross_m: float = 0.0
-    radial_m: float = 0.0
-    along_mps: float = 0.0
-    cross_mps: float = 0.0
-    radial_mps: float = 0.0
+    kind: Annotated[Literal["orbit"], Parameter("kind of the fault")] = "orbit"
+    along_m: Annotated[float, Parameter("along the track", "m", -1e6, 1e6)] = 0.0
+    cross_m: Annotated[float, Parameter(_ACROSS, "m", -1e6, 1e6)] = 0.0
+    radial_m: Annotated[float, Parameter("up", "m", -1e6, 1e6)] = 0.0
+    along_mps: Annotated[float, Parameter("growth along the track", "m/s", -1e3, 1e3)] = 0.0
+    cross_mps: Annotated[float, Parameter(f"growth {_ACROSS}", "m/s", -1e3, 1e3)] = 0.0
+    radial_mps: Annotated[float, Parameter("growth up", "m/s", -1e3, 1e3)] = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
         offsets = ("along", "cross", "radial")
-        all_within(self.owner, self, {f"{each}_m": (-1e6, 1e6) for each in offsets})
-        all_within(self.owner, self, {f"{each}_mps": (-1e3, 1e3) for each in offsets})
         if all(getattr(self, f"{each}_{unit}") == 0.0 for each in offsets for unit in ("m", "mps")):
             raise ValueError(f"{self.owner}: all offsets and rates are 0: nothing would happen")
 
@@ -107,28 +98,18 @@ BROADCAST_FIELDS: Final = (
 """Fields of an ephemeris a :class:`BroadcastFault` may change."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class BroadcastFault(SatelliteFault):
-    """The satellite broadcasts a wrong value in a new ephemeris, while it stays where it was.
+    """The satellite broadcasts a wrong value in a new ephemeris, while it stays where it was."""
 
-    Attributes
-    ----------
-    field : str
-        One of :data:`BROADCAST_FIELDS`.
-    change : float
-        Added to the field, in its unit.
-    """
-
-    kind: ClassVar[str] = "broadcast"
-
-    field: str
-    change: float
+    kind: Annotated[Literal["broadcast"], Parameter("kind of the fault")] = "broadcast"
+    field: Annotated[str, Parameter("field of the ephemeris", choices=BROADCAST_FIELDS)]
+    change: Annotated[float, Parameter("added to the field, in its unit", "-", -1e9, 1e9)]
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        one_of(self.owner, "field", self.field, BROADCAST_FIELDS)
-        if not (math.isfinite(self.change) and self.change != 0.0):
-            raise ValueError(f"{self.owner}: change = {self.change!r} is not a finite number other than 0")
+        if self.change == 0.0:
+            raise ValueError(f"{self.owner}: change is 0: nothing would happen")
 
 
 def with_wrong_broadcasts(

@@ -8,15 +8,14 @@ that code and carrier share, and outputs that are frozen, are for the world to t
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
-from typing import ClassVar, Final
+from typing import Annotated, Final, Literal
 
 import numpy as np
 
-from gbas_core.bounds import all_within, one_of, within
+from gbas_core.parameters import Parameter, parameters
 from gbas_core.record import BoolArray, FloatArray
-from gbas_core.satellites import N_SATS, SAT_INDEX
+from gbas_core.satellites import N_SATS, SAT_IDS, SAT_INDEX
 from gbas_core.signals import L1, L5, SPEED_OF_LIGHT_MPS
 from gbas_sim.faults.fault_base import RECEIVERS, Growing, IndexArray, Moment, SignalEffect, Window
 from gbas_sim.random_processes import Normals, Stream
@@ -27,27 +26,14 @@ QUANTITIES: Final = ("code_l1", "code_l5", "carrier_l1", "carrier_l5")
 _MILLISECOND_S: Final = 0.001
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class ReceiverFault(Window):
-    """A fault of one receiver.
+    """A fault of one receiver."""
 
-    Attributes
-    ----------
-    receiver : str
-        One of :data:`gbas_sim.faults.fault_base.RECEIVERS`.
-    satellites : tuple of str
-        Whose signals are hit, such as ``("G05", "E11")``; all if empty.
-    """
-
-    receiver: str
-    satellites: tuple[str, ...] = ()
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        one_of(self.owner, "receiver", self.receiver, RECEIVERS)
-        for satellite in self.satellites:
-            if satellite not in SAT_INDEX:
-                raise ValueError(f"{self.owner}: satellites = {satellite!r} is not one of G01 to G32 and E01 to E36")
+    receiver: Annotated[str, Parameter("receiver that is hit", choices=RECEIVERS)]
+    satellites: Annotated[
+        tuple[str, ...], Parameter("satellites whose signals are hit; all if empty", choices=SAT_IDS)
+    ] = ()
 
     @property
     def hit(self) -> BoolArray:
@@ -64,23 +50,17 @@ class ReceiverFault(Window):
         """Add what the fault does to an effect, in place; `draw` gives standard normal numbers of a shape."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class RangeFault(Growing, ReceiverFault):
-    """Ranges are wrong by a bias, a ramp or an acceleration.
+    """Ranges are wrong by a bias, a ramp or an acceleration."""
 
-    Attributes
-    ----------
-    quantities : tuple of str
-        What is wrong: ``"code_l1"``, ``"code_l5"``, ``"carrier_l1"``, ``"carrier_l5"``.
-    """
-
-    kind: ClassVar[str] = "range"
-
-    quantities: tuple[str, ...] = ("code_l1", "code_l5")
+    kind: Annotated[Literal["range"], Parameter("kind of the fault")] = "range"
+    quantities: Annotated[tuple[str, ...], Parameter("what is wrong", choices=QUANTITIES)] = ("code_l1", "code_l5")
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _check_quantities(self.owner, self.quantities)
+        if not self.quantities:
+            raise ValueError(f"{self.owner}: quantities is empty: nothing would happen")
 
     def add_to(self, effect: SignalEffect, moment: Moment, draw: Draw) -> None:
         size_m, rate_mps = (
@@ -94,27 +74,17 @@ class RangeFault(Growing, ReceiverFault):
                 effect.rate_mps[..., band, :] += rate_mps
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class NoiseBurst(ReceiverFault):
-    """Additional white noise, as of an interference.
+    """Additional white noise on both bands, as of an interference."""
 
-    Attributes
-    ----------
-    code_m, carrier_m : float
-        Standard deviations on both bands [m].
-    drop_db : float
-        By how much C/N0 falls meanwhile [dB].
-    """
-
-    kind: ClassVar[str] = "noise_burst"
-
-    code_m: float = 0.0
-    carrier_m: float = 0.0
-    drop_db: float = 0.0
+    kind: Annotated[Literal["noise_burst"], Parameter("kind of the fault")] = "noise_burst"
+    code_m: Annotated[float, Parameter("standard deviation of the codes", "m", 0.0, 1e4)] = 0.0
+    carrier_m: Annotated[float, Parameter("standard deviation of the carriers", "m", 0.0, 1e3)] = 0.0
+    drop_db: Annotated[float, Parameter("by how much C/N0 falls meanwhile", "dB", 0.0, 100.0)] = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        all_within(self.owner, self, {"code_m": (0.0, 1e4), "carrier_m": (0.0, 1e3), "drop_db": (0.0, 100.0)})
         if self.code_m == self.carrier_m == self.drop_db == 0.0:
             raise ValueError(f"{self.owner}: code_m, carrier_m and drop_db are all 0: nothing would happen")
 
@@ -133,34 +103,27 @@ class NoiseBurst(ReceiverFault):
             effect.cn0_db[..., band, :] -= self.drop_db * hit
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class FrozenOutput(ReceiverFault):
     """The receiver repeats its last observations, with time tags that go on."""
 
-    kind: ClassVar[str] = "frozen"
+    kind: Annotated[Literal["frozen"], Parameter("kind of the fault")] = "frozen"
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class ClockJump(ReceiverFault):
-    """The receiver's clock jumps ahead by milliseconds, up to the end if one is given.
+    """The receiver's clock jumps by milliseconds, ahead or back, up to the end if one is given.
 
-    Attributes
-    ----------
-    milliseconds : int
-        Below 0 it jumps back.
-    carrier_too : bool
-        Whether time tags and carriers jump with the codes, as in a receiver that steers its clock (a fault monitors
-        should not mind); else the codes alone are wrong.
+    When the carriers jump too, as time tags do then, it is as in a receiver that steers its clock (a fault monitors
+    should not mind); else the codes alone are wrong.
     """
 
-    kind: ClassVar[str] = "clock_jump"
-
-    milliseconds: int
-    carrier_too: bool = True
+    kind: Annotated[Literal["clock_jump"], Parameter("kind of the fault")] = "clock_jump"
+    milliseconds: Annotated[int, Parameter("how far ahead; below 0 back", "ms", -1000, 1000)]
+    carrier_too: Annotated[bool, Parameter("time tags and carriers jump with the codes")] = True
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        within(self.owner, "milliseconds", self.milliseconds, -1000, 1000)
         if self.milliseconds == 0:
             raise ValueError(f"{self.owner}: milliseconds is 0: nothing would happen")
         if self.carrier_too and self.satellites:
@@ -174,13 +137,6 @@ class ClockJump(ReceiverFault):
     def add_to(self, effect: SignalEffect, moment: Moment, draw: Draw) -> None:
         if not self.carrier_too:
             effect.code_m[...] += SPEED_OF_LIGHT_MPS * self.jump_s(moment)[..., np.newaxis, np.newaxis] * self.hit
-
-
-def _check_quantities(owner: str, quantities: tuple[str, ...]) -> None:
-    if not quantities:
-        raise ValueError(f"{owner}: quantities is empty: nothing would happen")
-    for quantity in quantities:
-        one_of(owner, "quantities", quantity, QUANTITIES)
 
 
 def receiver_effect(faults: Sequence[ReceiverFault], moment: Moment, *, epoch: int, seed: int) -> SignalEffect:

@@ -5,48 +5,36 @@ The divergence's fifteen modes and their signs are those of :mod:`gbas_core.rang
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import ClassVar, Final
+from typing import Annotated, Final, Literal
 
 import numpy as np
 
-from gbas_core.bounds import all_within, one_of
+from gbas_core.parameters import Parameter, parameters
 from gbas_core.ranging.fault_modes import FAULT_MODES, FAULT_SIGNS
 from gbas_core.record import FloatArray
 from gbas_core.satellites import IS_GPS
 from gbas_core.signals import BAND_INDEX, L1, L5, SPEED_OF_LIGHT_MPS, WAVELENGTH_M
 from gbas_sim.faults.deformation import Correlator, Deformation, deformation_bias_m
-from gbas_sim.faults.fault_base import RECEIVERS, Growing, Listener, Moment, SatelliteFault, SignalEffect
+from gbas_sim.faults.fault_base import RECEIVERS, Band, Growing, Listener, Moment, SatelliteFault, SignalEffect
 
 _SIGNALS_OF_BANDS: Final = {"L1": (0, 1), "L5": (2, 2)}
+BANDS_HIT: Final = Parameter("bands that are hit")
+RECEIVERS_HIT: Final = Parameter("receivers that are hit; all if empty", choices=RECEIVERS)
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class CodeCarrierDivergence(Growing, SatelliteFault):
     """Code and carrier drift apart: the size d is added to the codes, and taken from the carriers, of the mode.
 
-    Attributes
-    ----------
-    mode : str
-        One of the fifteen names of :data:`gbas_core.ranging.fault_modes.FAULT_MODES`.
-    weights : (float, float, float, float)
-        Factors on d for (code L1, code L5, carrier L1, carrier L5), as far as the mode has them; the paper assumes
-        that they may differ. (1, 1.7933, -1, -1.7933) on all four is how an ionosphere looks.
+    Weights are for (code L1, code L5, carrier L1, carrier L5), as far as the mode has them; the paper assumes that they
+    may differ. (1, 1.7933, -1, -1.7933) on all four is how an ionosphere looks.
     """
 
-    kind: ClassVar[str] = "divergence"
-
-    mode: str
-    weights: tuple[float, float, float, float] = FAULT_SIGNS
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.mode not in FAULT_MODES:
-            known = "; ".join(FAULT_MODES)
-            raise ValueError(f"{self.owner}: mode = {self.mode!r} is not one of: {known}")
-        if not (isinstance(self.weights, tuple) and len(self.weights) == 4):
-            raise ValueError(f"{self.owner}: weights = {self.weights!r} is not four numbers")
-        all_within(self.owner, self, {"weights": (-100.0, 100.0)})
+    kind: Annotated[Literal["divergence"], Parameter("kind of the fault")] = "divergence"
+    mode: Annotated[str, Parameter("which signals diverge", choices=tuple(FAULT_MODES))]
+    weights: Annotated[tuple[float, float, float, float], Parameter("factors on the size", "-", -100.0, 100.0)] = (
+        FAULT_SIGNS
+    )
 
     def add_to(self, effect: SignalEffect, moment: Moment) -> None:
         size_m, rate_mps = self.size(moment.since_s)
@@ -57,34 +45,26 @@ class CodeCarrierDivergence(Growing, SatelliteFault):
             effect.rate_mps[..., band, self.index] += factors[place + 2] * rate_mps
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class ExcessiveAcceleration(Growing, SatelliteFault):
     """Code and carrier on all bands move together, as with a satellite clock that accelerates, ramps or steps."""
 
-    kind: ClassVar[str] = "acceleration"
+    kind: Annotated[Literal["acceleration"], Parameter("kind of the fault")] = "acceleration"
 
     def add_to(self, effect: SignalEffect, moment: Moment) -> None:
         _add_common(effect, self.index, *self.size(moment.since_s))
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class ClockFault(SatelliteFault):
-    """The satellite's clock runs ahead of what it broadcasts: ranges become shorter.
+    """The satellite's clock runs ahead of what it broadcasts: ranges become shorter."""
 
-    Attributes
-    ----------
-    step_s, ramp_sps : float
-        At the start, and per time since [s], [s/s].
-    """
-
-    kind: ClassVar[str] = "clock"
-
-    step_s: float = 0.0
-    ramp_sps: float = 0.0
+    kind: Annotated[Literal["clock"], Parameter("kind of the fault")] = "clock"
+    step_s: Annotated[float, Parameter("at the start", "s", -1e-2, 1e-2)] = 0.0
+    ramp_sps: Annotated[float, Parameter("per time since", "s/s", -1e-5, 1e-5)] = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        all_within(self.owner, self, {"step_s": (-1e-2, 1e-2), "ramp_sps": (-1e-5, 1e-5)})
         if self.step_s == self.ramp_sps == 0.0:
             raise ValueError(f"{self.owner}: step_s and ramp_sps are both 0: nothing would happen")
 
@@ -101,33 +81,18 @@ def _add_common(effect: SignalEffect, index: int, size_m: FloatArray, rate_mps: 
     effect.rate_mps[..., index] += rate_mps[..., np.newaxis]
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class LowPower(SatelliteFault):
-    """The satellite's signals become weaker.
+    """The satellite's signals become weaker."""
 
-    Attributes
-    ----------
-    drop_db : float
-        At once [dB].
-    ramp_dbps : float
-        And per time since the start [dB/s].
-    largest_db : float
-        Weaker than this they do not become [dB].
-    bands : tuple of str
-        ``"L1"``, ``"L5"``.
-    """
-
-    kind: ClassVar[str] = "low_power"
-
-    drop_db: float = 0.0
-    ramp_dbps: float = 0.0
-    largest_db: float = 60.0
-    bands: tuple[str, ...] = ("L1", "L5")
+    kind: Annotated[Literal["low_power"], Parameter("kind of the fault")] = "low_power"
+    drop_db: Annotated[float, Parameter("at once", "dB", 0.0, 100.0)] = 0.0
+    ramp_dbps: Annotated[float, Parameter("and per time since the start", "dB/s", 0.0, 100.0)] = 0.0
+    largest_db: Annotated[float, Parameter("weaker than this they do not become", "dB", 0.0, 100.0)] = 60.0
+    bands: Annotated[tuple[Band, ...], BANDS_HIT] = ("L1", "L5")
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        bounds = {"drop_db": (0.0, 100.0), "ramp_dbps": (0.0, 100.0), "largest_db": (0.0, 100.0)}
-        all_within(self.owner, self, bounds)
         if self.drop_db == self.ramp_dbps == 0.0:
             raise ValueError(f"{self.owner}: drop_db and ramp_dbps are both 0: nothing would happen")
         _check_bands(self.owner, self.bands)
@@ -142,25 +107,19 @@ class LowPower(SatelliteFault):
             effect.cn0_db[..., BAND_INDEX[band], self.index] -= np.where(self.active(moment.since_s), weaker, 0.0)
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class SignalDeformation(SatelliteFault):
     """A deformed signal biases the code of each receiver as its correlators have it: see :mod:`deformation`.
 
-    Attributes
-    ----------
-    deformation : Deformation
-    band : str
-        ``"L1"`` or ``"L5"``; the threat models are known for L1 C/A only.
+    The threat models are known for L1 C/A only.
     """
 
-    kind: ClassVar[str] = "deformation"
-
+    kind: Annotated[Literal["deformation"], Parameter("kind of the fault")] = "deformation"
     deformation: Deformation
-    band: str = "L1"
+    band: Annotated[Band, Parameter("band of the signal")] = "L1"
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _check_bands(self.owner, (self.band,))
         if self._signal == 1 and self.deformation.lag_chips != 0.0:
             raise ValueError(f"{self.owner}: lag_chips has no model for E1, whose subcarrier has edges of its own")
 
@@ -186,33 +145,20 @@ class SignalDeformation(SatelliteFault):
         effect.code_m[..., BAND_INDEX[self.band], self.index] += biased
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class CycleSlip(SatelliteFault):
-    """The carrier jumps by whole cycles, for good unless an end is given.
+    """The carrier jumps by whole cycles, for good unless an end is given."""
 
-    Attributes
-    ----------
-    cycles_l1, cycles_l5 : int
-        Added to the carriers.
-    receivers : tuple of str
-        Whose, in :data:`RECEIVERS`; all if empty.
-    flagged : bool
-        Whether the receiver notices (loss-of-lock indicator).
-    """
-
-    kind: ClassVar[str] = "cycle_slip"
-
-    cycles_l1: int = 0
-    cycles_l5: int = 0
-    receivers: tuple[str, ...] = ()
-    flagged: bool = False
+    kind: Annotated[Literal["cycle_slip"], Parameter("kind of the fault")] = "cycle_slip"
+    cycles_l1: Annotated[int, Parameter("added to the carrier on L1", "cycles", -1e9, 1e9)] = 0
+    cycles_l5: Annotated[int, Parameter("added to the carrier on L5", "cycles", -1e9, 1e9)] = 0
+    receivers: Annotated[tuple[str, ...], RECEIVERS_HIT] = ()
+    flagged: Annotated[bool, Parameter("the receiver notices (loss-of-lock indicator)")] = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        all_within(self.owner, self, {"cycles_l1": (-1e9, 1e9), "cycles_l5": (-1e9, 1e9)})
         if self.cycles_l1 == self.cycles_l5 == 0:
             raise ValueError(f"{self.owner}: cycles_l1 and cycles_l5 are both 0: nothing would happen")
-        _check_receivers(self.owner, self.receivers)
 
     def add_to(self, effect: SignalEffect, moment: Moment) -> None:
         theirs = moment.named(self.receivers)
@@ -224,31 +170,18 @@ class CycleSlip(SatelliteFault):
                 effect.slipped[..., band, self.index] |= new
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class LossOfLock(SatelliteFault):
-    """Signals are not tracked; afterwards their carriers count from elsewhere.
+    """Signals are not tracked; afterwards their carriers count from elsewhere."""
 
-    Attributes
-    ----------
-    bands : tuple of str
-        ``"L1"``, ``"L5"``.
-    receivers : tuple of str
-        Whose, in :data:`RECEIVERS`; all if empty.
-    cycles : int
-        By which the carriers differ afterwards from what they would have been.
-    """
-
-    kind: ClassVar[str] = "loss_of_lock"
-
-    bands: tuple[str, ...] = ("L1", "L5")
-    receivers: tuple[str, ...] = ()
-    cycles: int = 1000
+    kind: Annotated[Literal["loss_of_lock"], Parameter("kind of the fault")] = "loss_of_lock"
+    bands: Annotated[tuple[Band, ...], BANDS_HIT] = ("L1", "L5")
+    receivers: Annotated[tuple[str, ...], RECEIVERS_HIT] = ()
+    cycles: Annotated[int, Parameter("by which the carriers differ afterwards", "cycles", -1e9, 1e9)] = 1000
 
     def __post_init__(self) -> None:
         super().__post_init__()
         _check_bands(self.owner, self.bands)
-        _check_receivers(self.owner, self.receivers)
-        all_within(self.owner, self, {"cycles": (-1e9, 1e9)})
 
     def add_to(self, effect: SignalEffect, moment: Moment) -> None:
         theirs = moment.named(self.receivers)
@@ -260,13 +193,6 @@ class LossOfLock(SatelliteFault):
             effect.slipped[..., band, self.index] |= moment.just_now(self.end_s) & theirs
 
 
-def _check_bands(owner: str, bands: tuple[str, ...]) -> None:
+def _check_bands(owner: str, bands: tuple[Band, ...]) -> None:
     if not bands:
         raise ValueError(f"{owner}: bands is empty: nothing would happen")
-    for band in bands:
-        one_of(owner, "band", band, ("L1", "L5"))
-
-
-def _check_receivers(owner: str, receivers: tuple[str, ...]) -> None:
-    for receiver in receivers:
-        one_of(owner, "receivers", receiver, RECEIVERS)

@@ -8,51 +8,41 @@ acceleration leave no step in a carrier phase.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from gbas_core.gnss.frames import geodetic_from_ecef, rot_enu_ecef
+from gbas_core.parameters import Parameter, parameters
 from gbas_core.positioning.approach import FinalApproach
 from gbas_core.record import FloatArray
 
 
-@dataclass(frozen=True, kw_only=True)
-class StraightIn:
-    """A straight-in approach.
+@parameters
+class StraightInParams:
+    """A straight-in approach on whichever final approach the station has."""
 
-    Attributes
-    ----------
-    approach : FinalApproach
-    speed_mps : float
-        Speed along the path in descent [m/s].
-    intercept_distance_m : float
-        Distance to the threshold at which level flight meets the path [m].
-    level_time_s : float
-        Time in level flight before that [s]: filters on the ground and on board settle meanwhile.
-    pushover_time_s : float
-        Duration of the change of slope, centred on the intercept [s].
-    """
+    speed_mps: Annotated[float, Parameter("along the path in descent", "m/s", 10.0, 200.0)] = 70.0
+    intercept_distance_m: Annotated[
+        float, Parameter("from the threshold to where level flight meets the path", "m", 500.0, 50_000.0)
+    ] = 20_000.0
+    level_time_s: Annotated[
+        float, Parameter("in level flight before that: filters on the ground and on board settle", "s", 0.0, 1800.0)
+    ] = 300.0
+    pushover_time_s: Annotated[float, Parameter("duration of the change of slope, centred there", "s", 2.0, 60.0)] = (
+        20.0
+    )
+
+
+@parameters
+class StraightIn(StraightInParams):
+    """A straight-in approach on a final approach."""
 
     approach: FinalApproach
-    speed_mps: float = 70.0
-    intercept_distance_m: float = 20_000.0
-    level_time_s: float = 300.0
-    pushover_time_s: float = 20.0
 
     def __post_init__(self) -> None:
-        bounds = {
-            "speed_mps": (10.0, 200.0),
-            "intercept_distance_m": (500.0, 50_000.0),
-            "level_time_s": (0.0, 1800.0),
-            "pushover_time_s": (2.0, 60.0),
-        }
-        for key, (low, high) in bounds.items():
-            value = getattr(self, key)
-            if not low <= value <= high:
-                raise ValueError(f"flight: {key} = {value!r} is not within {low:g} to {high:g}")
         if self._blend_m > 2.0 * self.intercept_distance_m:
             raise ValueError(
                 f"flight: pushover_time_s = {self.pushover_time_s!r} is more than the descent from the intercept allows"

@@ -7,14 +7,14 @@ from typing import Annotated, Any
 
 from gbas_core.gnss.ephemeris import Ephemeris
 from gbas_core.gnss.gpstime import epoch_key
-from gbas_core.parameters import Parameter, parameters
+from gbas_core.parameters import Parameter, merged, nested, parameters
 from gbas_msgs_py import tables, topics
 from gbas_msgs_py.joining import ReceptionQueue
 from gbas_msgs_py.tables import TruthEpoch
 from gbas_node.driver import DriverNode
 from gbas_node.node import run
 from gbas_node.params import DriverParams
-from gbas_sim.scenario import open_world, read_sections, scenario_from_mapping, scenario_values
+from gbas_sim.scenario import SECTION, open_world, read_sections, scenario_from_mapping, sim_params
 from gbas_sim.world import SimulatedEpoch, Truth, World
 
 ACK_TIMEOUT_S = 10.0
@@ -39,9 +39,8 @@ class Simulator(DriverNode[SimulatedEpoch]):
     def __init__(self, **kwargs: Any) -> None:
         self._world: World | None = None
         super().__init__("simulator", **kwargs)
-        sections, _ = self._sections()
-        for key, value in scenario_values(self.world.params, sections).items():
-            self.declare_read_only(key, value, "simulated world")
+        sections, source = self._sections()
+        self.show_parameters(sim_params(sections, source=source), f"{SECTION}.")
         self.ephemerides: ReceptionQueue[Ephemeris] = ReceptionQueue()
         for each in self.world.ephemerides:
             self.ephemerides.add(epoch_key(each.gps_week, each.tow_s), each)
@@ -68,8 +67,8 @@ class Simulator(DriverNode[SimulatedEpoch]):
 
     def _sections(self) -> tuple[dict[str, Any], str]:
         config = self.params.config
-        given = {key: value for key, value in self.overrides().items() if key.startswith(("ground.", "sim."))}
-        return {**(read_sections(config) if config else {}), **given}, config or "ROS parameters"
+        given = {key: value for key, value in self.overrides().items() if key.startswith(("ground.", f"{SECTION}."))}
+        return merged(read_sections(config) if config else {}, nested(given)), config or "ROS parameters"
 
     def flies(self) -> bool:
         return self.world.params.flight is not None

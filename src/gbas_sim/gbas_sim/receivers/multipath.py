@@ -12,14 +12,13 @@ smoothing filter passes it, from the filter of ICAO Annex 10 Vol. I, App. B 3.6.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Final
+from typing import Annotated, Final
 
 import numpy as np
 
-from gbas_core.bounds import all_within, within
+from gbas_core.parameters import Parameter, parameters
 from gbas_core.record import FloatArray
 from gbas_core.satellites import N_GPS, N_SATS
 from gbas_core.signals import L1, L5, N_BANDS
@@ -28,28 +27,19 @@ from gbas_sim.random_processes import EVERYONE, GaussMarkov, Normals, Stream
 _BANDS: Final = 2  # drawn: L1 and L5
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class ElevationCurve:
-    """A standard deviation by elevation, linear between the points given and constant beyond them.
+    """A standard deviation by elevation, linear between the points given and constant beyond them."""
 
-    Attributes
-    ----------
-    elevation_deg : tuple of float
-        Ascending, from 0 to 90 [deg].
-    sigma_m : tuple of float
-        As many [m].
-    """
-
-    elevation_deg: tuple[float, ...] = (90.0,)
-    sigma_m: tuple[float, ...] = (0.0,)
+    elevation_deg: Annotated[tuple[float, ...], Parameter("ascending, in degrees", "-", 0.0, 90.0)] = (90.0,)
+    sigma_m: Annotated[tuple[float, ...], Parameter("standard deviation there", "m", 0.0, 100.0)] = (0.0,)
 
     def __post_init__(self) -> None:
         elevations = self.elevation_deg
         if not elevations or len(elevations) != len(self.sigma_m):
-            raise ValueError("elevation curve: sigma_m has not as many values as elevation_deg, or both are empty")
+            raise ValueError("sigma_m has not as many values as elevation_deg, or both are empty")
         if any(later <= earlier for earlier, later in pairwise(elevations)):
-            raise ValueError(f"elevation curve: elevation_deg = {elevations!r} is not ascending")
-        all_within("elevation curve", self, {"elevation_deg": (0.0, 90.0), "sigma_m": (0.0, 100.0)})
+            raise ValueError(f"elevation_deg = {elevations!r} is not ascending")
 
     @classmethod
     def constant(cls, sigma_m: float) -> ElevationCurve:
@@ -75,35 +65,22 @@ class ElevationCurve:
 _NONE: Final = ElevationCurve()
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class CorrelatedError:
     """One kind of error with memory; triples are for L1 C/A, E1, and L5 with E5a.
 
-    Attributes
-    ----------
-    name : str
-        For messages.
-    correlation_s : float
-        Time in which the autocorrelation falls to 1/e [s]; 0 is white noise.
-    code : (ElevationCurve, ElevationCurve, ElevationCurve)
-        Standard deviation of the code.
-    carrier : (ElevationCurve, ElevationCurve, ElevationCurve)
-        Standard deviation of the carrier, independent of the code.
-    shared : bool
-        Whether all receivers of the kind have the same error, rather than each its own.
+    Code and carrier are the curves of their standard deviations, independent of each other.
     """
 
-    name: str
-    correlation_s: float
+    name: Annotated[str, Parameter("for messages")]
+    correlation_s: Annotated[
+        float, Parameter("time in which the autocorrelation falls to 1/e; 0 is white noise", "s", 0.0, 100_000.0)
+    ]
     code: tuple[ElevationCurve, ElevationCurve, ElevationCurve] = (_NONE, _NONE, _NONE)
     carrier: tuple[ElevationCurve, ElevationCurve, ElevationCurve] = (_NONE, _NONE, _NONE)
-    shared: bool = False
-
-    def __post_init__(self) -> None:
-        within(f"error {self.name}", "correlation_s", self.correlation_s, 0.0, 100_000.0)
-        for key in ("code", "carrier"):
-            if len(getattr(self, key)) != 3:
-                raise ValueError(f"error {self.name}: {key} has not three curves (L1 C/A, E1, L5/E5a)")
+    shared: Annotated[bool, Parameter("all receivers of the kind have the same error, rather than each its own")] = (
+        False
+    )
 
 
 def curves_m(curves: tuple[ElevationCurve, ElevationCurve, ElevationCurve], elevation_rad: FloatArray) -> FloatArray:

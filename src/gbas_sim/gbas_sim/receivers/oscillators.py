@@ -8,12 +8,11 @@ deviation has the two slopes, and less than it should between them.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import Annotated, Final, NamedTuple
 
 import numpy as np
 
-from gbas_core.bounds import all_within
+from gbas_core.parameters import Parameter, parameters
 from gbas_core.record import FloatArray
 from gbas_core.satellites import IS_GPS, N_SATS
 from gbas_core.signals import L1, L5, N_BANDS
@@ -22,35 +21,20 @@ from gbas_sim.random_processes import Normals, Stream, TwoStateWalk
 _MILLISECOND_S: Final = 0.001
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class OscillatorParams:
     """A kind of clock.
 
-    Attributes
-    ----------
-    h0_s : float
-        Coefficient of white frequency noise, whose Allan variance is ``h0 / (2 tau)`` [s].
-    h_minus2_hz : float
-        Coefficient of random walk of frequency, whose Allan variance is ``2 pi^2 / 3 h_-2 tau`` [1/s].
-    offset_s, drift : float
-        Bounds of the offset and the rate at the start, which are drawn for each receiver [s], [s/s].
-    millisecond_steps : bool
-        Whether the receiver keeps its clock within half a millisecond by steps of whole ones: code and carrier jump
-        together, as time tags do.
+    White frequency noise has the Allan variance ``h0 / (2 tau)``, random walk of frequency ``2 pi^2 / 3 h_-2 tau``. A
+    receiver that keeps its clock within half a millisecond by steps of whole ones has code and carrier jump together,
+    as time tags do.
     """
 
-    h0_s: float = 0.0
-    h_minus2_hz: float = 0.0
-    offset_s: float = 1.0e-6
-    drift: float = 1.0e-9
-    millisecond_steps: bool = False
-
-    def __post_init__(self) -> None:
-        all_within(
-            "oscillator",
-            self,
-            {"h0_s": (0.0, 1e-15), "h_minus2_hz": (0.0, 1e-15), "offset_s": (0.0, 1e-3), "drift": (0.0, 1e-5)},
-        )
+    h0_s: Annotated[float, Parameter("coefficient of white frequency noise", "s", 0.0, 1e-15)] = 0.0
+    h_minus2_hz: Annotated[float, Parameter("coefficient of random walk of frequency", "1/s", 0.0, 1e-15)] = 0.0
+    offset_s: Annotated[float, Parameter("bound of the offset at the start, drawn by receiver", "s", 0.0, 1e-3)] = 1e-6
+    drift: Annotated[float, Parameter("bound of the rate at the start, drawn by receiver", "s/s", 0.0, 1e-5)] = 1e-9
+    millisecond_steps: Annotated[bool, Parameter("the clock is kept within half a millisecond by steps")] = False
 
     def allan_deviation(self, tau_s: float) -> float:
         """Allan deviation over a time [-]."""
@@ -115,26 +99,20 @@ class ClockBank:
         return ClockState(offset_s=offset_s, drift=drift)
 
 
-@dataclass(frozen=True, kw_only=True)
+BAND_DELAY: Final = Parameter("bound of the delay of code and carrier on L5 relative to L1", "m", 0.0, 1e3)
+SYSTEM_DELAY: Final = Parameter("bound of the delay of Galileo relative to GPS", "m", 0.0, 1e3)
+CODE_CARRIER_DELAY: Final = Parameter(
+    "bound of the code's delay relative to the carrier's, by band and system", "m", 0.0, 1e3
+)
+
+
+@parameters
 class HardwareParams:
-    """Delays of receivers, each drawn once from a uniform distribution.
+    """Delays of receivers, each drawn once from a uniform distribution."""
 
-    Attributes
-    ----------
-    band_m : float
-        Bound of the delay of code and carrier on L5 relative to L1 [m].
-    system_m : float
-        Bound of the delay of Galileo relative to GPS [m].
-    code_carrier_m : float
-        Bound of the code's delay relative to the carrier's, for each band and system [m].
-    """
-
-    band_m: float = 3.0
-    system_m: float = 3.0
-    code_carrier_m: float = 1.0
-
-    def __post_init__(self) -> None:
-        all_within("hardware", self, {"band_m": (0.0, 1e3), "system_m": (0.0, 1e3), "code_carrier_m": (0.0, 1e3)})
+    band_m: Annotated[float, BAND_DELAY] = 3.0
+    system_m: Annotated[float, SYSTEM_DELAY] = 3.0
+    code_carrier_m: Annotated[float, CODE_CARRIER_DELAY] = 1.0
 
 
 class HardwareDelays(NamedTuple):

@@ -15,11 +15,11 @@ the surrogates of :mod:`gbas_core.models.error_models`. Correlation times are ou
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Final, get_args
+from typing import Annotated, Final, Literal, get_args
 
 import numpy as np
+from pydantic import Field
 
-from gbas_core.bounds import one_of
 from gbas_core.models.error_models import (
     AAD_A,
     AAD_B,
@@ -38,14 +38,15 @@ from gbas_core.models.error_models import (
     GroundAccuracy,
     GroundCurve,
 )
+from gbas_core.parameters import Parameter, parameters
 from gbas_core.record import FloatArray
 from gbas_core.satellites import IS_GALILEO, IS_GPS, N_SATS
-from gbas_core.signal.antenna import LinkBudget
-from gbas_core.signal.tracking_loops import TrackingParams, noise_sigmas
+from gbas_core.signal.antenna import ANTENNA, LinkBudget
+from gbas_core.signal.tracking_loops import CARRIER_BANDWIDTH, CODE_BANDWIDTH, NOISE_SCALE, TrackingParams, noise_sigmas
 from gbas_core.signals import L1, L5
 from gbas_sim.receivers.multipath import CorrelatedError, ElevationCurve, smoothing_gain
-from gbas_sim.receivers.oscillators import OSCILLATORS
-from gbas_sim.receivers.receiver_model import IDEAL, ReceiverModel
+from gbas_sim.receivers.oscillators import BAND_DELAY, CODE_CARRIER_DELAY, OSCILLATORS, SYSTEM_DELAY, HardwareParams
+from gbas_sim.receivers.receiver_model import CN0_SIGMA, ELEVATION_MASK, IDEAL, RINEX_STEPS, ReceiverModel
 
 PRESETS: Final = ("ideal", "gad_a", "gad_b", "gad_c", "aad_a", "aad_b")
 TAU_S: Final = 100.0
@@ -62,9 +63,100 @@ _AIRBORNE_NOISE_S: Final = 10.0
 # Uncertain, ours: multipath of the carrier over that of the code.
 _CARRIER_SHARE: Final = 0.003
 
-_SITE_LINK: Final = LinkBudget(antenna="mla")
-_AIRFRAME_LINK: Final = LinkBudget(antenna="patch")
 
+@parameters
+class SiteLink(LinkBudget):
+    """Link budget at a reference station, whose antennas limit multipath."""
+
+    antenna: Annotated[str, ANTENNA] = "mla"
+
+
+@parameters
+class AirborneTracking(TrackingParams):
+    """Loops of a receiver that moves."""
+
+    code_bandwidth_hz: Annotated[float, CODE_BANDWIDTH] = 0.5
+    carrier_bandwidth_hz: Annotated[float, CARRIER_BANDWIDTH] = 18.0
+
+
+@parameters
+class NoiselessTracking(TrackingParams):
+    """Loops without noise."""
+
+    noise_scale: Annotated[float, NOISE_SCALE] = 0.0
+
+
+@parameters
+class NoHardware(HardwareParams):
+    """Hardware without delays."""
+
+    band_m: Annotated[float, BAND_DELAY] = 0.0
+    system_m: Annotated[float, SYSTEM_DELAY] = 0.0
+    code_carrier_m: Annotated[float, CODE_CARRIER_DELAY] = 0.0
+
+
+@parameters
+class PresetParams:
+    """What sections of receivers with a preset have beside the name and what is the preset's own."""
+
+    oscillator: Annotated[
+        str | None, Parameter("kind of the clock; the preset's unless given", choices=tuple(OSCILLATORS))
+    ] = None
+    hardware: HardwareParams = HardwareParams()
+    elevation_mask_rad: Annotated[float, ELEVATION_MASK] = IDEAL.elevation_mask_rad
+    cn0_sigma_db: Annotated[float, CN0_SIGMA] = 0.2
+    rinex_steps: Annotated[bool, RINEX_STEPS] = False
+
+
+@parameters
+class GroundPresetParams(PresetParams):
+    """A reference receiver of a ground accuracy designator."""
+
+    preset: Annotated[Literal["gad_a", "gad_b", "gad_c"], Parameter("accuracy designator")]
+    cn0: SiteLink = SiteLink()
+    tracking: TrackingParams = TrackingParams()
+
+
+@parameters
+class AirbornePresetParams(PresetParams):
+    """An airborne receiver of an airborne accuracy designator."""
+
+    preset: Annotated[Literal["aad_a", "aad_b"], Parameter("accuracy designator")]
+    cn0: LinkBudget = LinkBudget()
+    tracking: AirborneTracking = AirborneTracking()
+
+
+@parameters
+class IdealPresetParams(PresetParams):
+    """A receiver without errors; without a link budget C/N0 goes with the sine of the elevation."""
+
+    preset: Annotated[Literal["ideal"], Parameter("without errors")]
+    cn0: LinkBudget | None = None
+    tracking: NoiselessTracking = NoiselessTracking()
+    hardware: NoHardware = NoHardware()
+    cn0_sigma_db: Annotated[float, CN0_SIGMA] = 0.0
+
+
+AnyPreset = Annotated[GroundPresetParams | AirbornePresetParams | IdealPresetParams, Field(discriminator="preset")]
+
+
+def preset_receiver(params: AnyPreset, *, interval_s: float) -> ReceiverModel:
+    """The receiver of a section with a preset; its errors are those of the preset's own loops.
+
+    Raises
+    ------
+    ValueError
+        As :func:`receiver_preset`.
+    """
+    preset = receiver_preset(params.preset, interval_s=interval_s, cn0=params.cn0)
+    own = {key: getattr(params, key) for key in ("hardware", "elevation_mask_rad", "cn0_sigma_db", "rinex_steps")}
+    if params.oscillator is not None:
+        own["oscillator"] = OSCILLATORS[params.oscillator]
+    return replace(preset, tracking=params.tracking, **own)
+
+
+_SITE_LINK: Final = SiteLink()
+_AIRBORNE_LINK: Final = LinkBudget()
 _DEGREES: Final[FloatArray] = np.arange(91.0)
 _Targets = tuple[FloatArray, FloatArray, FloatArray]
 
@@ -85,7 +177,8 @@ def receiver_preset(name: str, *, interval_s: float = 0.5, cn0: LinkBudget | Non
     ValueError
         For an unknown name, or when thermal noise alone is above the curve.
     """
-    one_of("receiver", "preset", name, PRESETS)
+    if name not in PRESETS:
+        raise ValueError(f"receiver: preset = {name!r} is not one of {', '.join(PRESETS)}")
     kind, _, letter = name.partition("_")
     designator = letter.upper()
     if kind == "ideal":
@@ -98,7 +191,7 @@ def receiver_preset(name: str, *, interval_s: float = 0.5, cn0: LinkBudget | Non
 
 def default_link(name: str) -> LinkBudget:
     """The link budget of a preset: antennas of reference stations limit multipath, the aircraft has a patch."""
-    return _SITE_LINK if name.startswith("gad") else _AIRFRAME_LINK
+    return _SITE_LINK if name.startswith("gad") else _AIRBORNE_LINK
 
 
 def ground_receiver(
@@ -125,7 +218,7 @@ def ground_receiver(
     ValueError
         For another designator, or when thermal noise alone is above the curve.
     """
-    one_of("reference receiver", "designator", designator, get_args(GroundAccuracy))
+    _known("reference receiver", designator, get_args(GroundAccuracy))
     model = ReceiverModel(
         tracking=TrackingParams(),
         cn0=cn0,
@@ -146,7 +239,7 @@ def airborne_receiver(
     interval_s: float = 0.5,
     noise_s: float = _AIRBORNE_NOISE_S,
     multipath_s: float = _AIRFRAME_MULTIPATH_S,
-    cn0: LinkBudget = _AIRFRAME_LINK,
+    cn0: LinkBudget = _AIRBORNE_LINK,
 ) -> ReceiverModel:
     """An airborne receiver of an airborne accuracy designator, on an airframe.
 
@@ -164,9 +257,9 @@ def airborne_receiver(
     ValueError
         For another designator, or when thermal noise alone is above the curve.
     """
-    one_of("airborne receiver", "designator", designator, get_args(AirborneAccuracy))
+    _known("airborne receiver", designator, get_args(AirborneAccuracy))
     model = ReceiverModel(
-        tracking=TrackingParams(code_bandwidth_hz=0.5, carrier_bandwidth_hz=18.0),
+        tracking=AirborneTracking(),
         cn0=cn0,
         oscillator=OSCILLATORS["tcxo_good"],
     )
@@ -178,6 +271,11 @@ def airborne_receiver(
         _error("airframe multipath", multipath, None, multipath_s, interval_s, carrier_share=_CARRIER_SHARE),
     )
     return ReceiverModel(tracking=model.tracking, cn0=model.cn0, oscillator=model.oscillator, errors=errors)
+
+
+def _known(kind: str, designator: str, known: tuple[str, ...]) -> None:
+    if designator not in known:
+        raise ValueError(f"{kind}: designator = {designator!r} is not one of {', '.join(known)}")
 
 
 def _airborne_sigma(curve: AirborneCurve) -> FloatArray:

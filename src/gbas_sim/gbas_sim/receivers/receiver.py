@@ -13,14 +13,14 @@ Source of the loop formulas: Kaplan and Hegarty, Understanding GPS, 2nd edition 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from enum import IntEnum
-from typing import Final, NamedTuple
+from typing import Annotated, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gbas_core.gnss.observations import ObservationEpoch
+from gbas_core.parameters import Parameter, parameters
 from gbas_core.record import FloatArray, IntArray
 from gbas_core.satellites import IS_GPS, N_SATS
 from gbas_core.signals import IONO_RATIO, L1, L5, N_BANDS, SPEED_OF_LIGHT_MPS, WAVELENGTH_M
@@ -28,7 +28,7 @@ from gbas_sim.atmosphere.paths import Delay
 from gbas_sim.random_processes import Normals
 from gbas_sim.receivers.arcs import jumps
 from gbas_sim.receivers.oscillators import ClockState
-from gbas_sim.receivers.receiver_model import ReceiverErrors, ReceiverModel, SignalErrors, rinex_rounded
+from gbas_sim.receivers.receiver_model import ELEVATION_MASK, ReceiverErrors, ReceiverModel, SignalErrors, rinex_rounded
 from gbas_sim.satellites.sightlines import Sightlines
 
 _CA_CHIP_M: Final = SPEED_OF_LIGHT_MPS / 1.023e6
@@ -54,68 +54,58 @@ class Stream(IntEnum):
     NOISE = 4
 
 
-@dataclass(frozen=True, kw_only=True)
-class ReceiverParams:
-    """A kind of receiver.
+_PAIR: Final = "on L1 and on L5"
 
-    Attributes
-    ----------
-    elevation_mask_rad : float
-        Lowest elevation tracked [rad].
-    cn0_zenith_dbhz, cn0_horizon_dbhz : (float, float)
-        C/N0 on L1 and on L5 at the zenith and at the horizon; in between it goes with the sine of elevation. Ours.
-    spacing_chips : (float, float)
-        Early-late spacing on L1 and on L5 [chips].
-    code_bandwidth_hz : float
-        Noise bandwidth of a pseudorange as output. Observations averaged over their interval T have 1/(2T), and only
-        then are white: 1 Hz for 2 Hz data.
-    carrier_bandwidth_hz, frequency_bandwidth_hz : float
-        Bandwidths of the phase and frequency loops.
-    integration_s : float
-        Coherent integration time [s].
-    noise_scale : float
-        Factor on all noise; 0 switches it off.
-    clock_offset_s, clock_drift : float
-        Bounds of the clock's offset and rate, which are drawn for each receiver.
+
+@parameters
+class ReceiverParams:
+    """A kind of receiver; C/N0 goes with the sine of elevation between horizon and zenith. Ours.
+
+    Observations averaged over their interval T have a noise bandwidth of 1/(2T), and only then are white: 1 Hz for 2 Hz
+    data.
     """
 
-    elevation_mask_rad: float = math.radians(3.0)
-    cn0_zenith_dbhz: tuple[float, float] = (50.0, 52.0)
-    cn0_horizon_dbhz: tuple[float, float] = (37.0, 39.0)
-    spacing_chips: tuple[float, float] = (0.1, 1.0)
-    code_bandwidth_hz: float = 1.0
-    carrier_bandwidth_hz: float = 15.0
-    frequency_bandwidth_hz: float = 2.0
-    integration_s: float = 0.02
-    noise_scale: float = 1.0
-    clock_offset_s: float = 1.0e-6
-    clock_drift: float = 1.0e-9
+    elevation_mask_rad: Annotated[float, ELEVATION_MASK] = math.radians(3.0)
+    cn0_zenith_dbhz: Annotated[tuple[float, float], Parameter(f"C/N0 at the zenith {_PAIR}", "dB-Hz", 20.0, 70.0)] = (
+        50.0,
+        52.0,
+    )
+    cn0_horizon_dbhz: Annotated[tuple[float, float], Parameter(f"C/N0 at the horizon {_PAIR}", "dB-Hz", 20.0, 70.0)] = (
+        37.0,
+        39.0,
+    )
+    spacing_chips: Annotated[tuple[float, float], Parameter(f"early to late {_PAIR}", "chips", 0.01, 1.5)] = (0.1, 1.0)
+    code_bandwidth_hz: Annotated[float, Parameter("noise bandwidth of a pseudorange as output", "Hz", 0.01, 100.0)] = (
+        1.0
+    )
+    carrier_bandwidth_hz: Annotated[float, Parameter("of the phase loop", "Hz", 0.1, 100.0)] = 15.0
+    frequency_bandwidth_hz: Annotated[float, Parameter("of the frequency loop", "Hz", 0.1, 100.0)] = 2.0
+    integration_s: Annotated[float, Parameter("coherent integration time", "s", 0.001, 1.0)] = 0.02
+    noise_scale: Annotated[float, Parameter("factor on all noise; 0 switches it off", "-", 0.0, 100.0)] = 1.0
+    clock_offset_s: Annotated[
+        float, Parameter("bound of the clock's offset, drawn for each receiver", "s", 0.0, 1.0e-3)
+    ] = 1.0e-6
+    clock_drift: Annotated[
+        float, Parameter("bound of the clock's rate, drawn for each receiver", "s/s", 0.0, 1.0e-6)
+    ] = 1.0e-9
 
-    def __post_init__(self) -> None:
-        bounds = {
-            "elevation_mask_rad": (0.0, 1.5),
-            "cn0_zenith_dbhz": (20.0, 70.0),
-            "cn0_horizon_dbhz": (20.0, 70.0),
-            "spacing_chips": (0.01, 1.5),
-            "code_bandwidth_hz": (0.01, 100.0),
-            "carrier_bandwidth_hz": (0.1, 100.0),
-            "frequency_bandwidth_hz": (0.1, 100.0),
-            "integration_s": (0.001, 1.0),
-            "noise_scale": (0.0, 100.0),
-            "clock_offset_s": (0.0, 1.0e-3),
-            "clock_drift": (0.0, 1.0e-6),
-        }
-        for key, (low, high) in bounds.items():
-            value = getattr(self, key)
-            pair = key in ("cn0_zenith_dbhz", "cn0_horizon_dbhz", "spacing_chips")
-            if pair and not (isinstance(value, tuple) and len(value) == 2):
-                raise ValueError(f"receiver: {key} = {value!r} is not two numbers (L1, L5)")
-            if not all(low <= each <= high for each in (value if pair else (value,))):
-                raise ValueError(f"receiver: {key} = {value!r} is not within {low:g} to {high:g}")
+
+@parameters
+class AirborneReceiverParams(ReceiverParams):
+    """As :class:`ReceiverParams`, with the aircraft's weaker signals."""
+
+    cn0_zenith_dbhz: Annotated[tuple[float, float], Parameter(f"C/N0 at the zenith {_PAIR}", "dB-Hz", 20.0, 70.0)] = (
+        48.0,
+        50.0,
+    )
+    cn0_horizon_dbhz: Annotated[tuple[float, float], Parameter(f"C/N0 at the horizon {_PAIR}", "dB-Hz", 20.0, 70.0)] = (
+        36.0,
+        38.0,
+    )
 
 
 GROUND_RECEIVER: Final = ReceiverParams()
-AIRBORNE_RECEIVER: Final = ReceiverParams(cn0_zenith_dbhz=(48.0, 50.0), cn0_horizon_dbhz=(36.0, 38.0))
+AIRBORNE_RECEIVER: Final = AirborneReceiverParams()
 
 
 def cn0_dbhz(params: ReceiverParams, elevation_rad: FloatArray) -> FloatArray:

@@ -12,13 +12,13 @@ Everything is a function of the parameters and the number of the epoch: nothing 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import Final, NamedTuple
+from dataclasses import replace
+from typing import Annotated, Final, NamedTuple
 
 import numpy as np
 
-from gbas_core.bounds import all_within
 from gbas_core.gnss.observations import ObservationEpoch
+from gbas_core.parameters import Parameter, parameters
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import N_SATS
 from gbas_core.signal.antenna import Cn0Curve, Cn0Model
@@ -39,38 +39,23 @@ from gbas_sim.receivers.oscillators import (
 _RINEX_STEP: Final = 0.001
 _WHITE: Final = 3  # carrier, Doppler, C/N0
 
+ELEVATION_MASK: Final = Parameter("lowest elevation tracked", "deg", 0.0, math.degrees(1.5))
+CN0_SIGMA: Final = Parameter("white noise of the C/N0 that is output", "dB", 0.0, 10.0)
+RINEX_STEPS: Final = Parameter("observations are rounded to the digits of a RINEX file")
 
-@dataclass(frozen=True, kw_only=True)
+
+@parameters
 class ReceiverModel:
-    """A kind of receiver with its antenna and site.
-
-    Attributes
-    ----------
-    tracking : TrackingParams
-    cn0 : Cn0Curve or LinkBudget
-    errors : tuple of CorrelatedError
-        Multipath and other errors with memory.
-    oscillator : OscillatorParams
-    hardware : HardwareParams
-    elevation_mask_rad : float
-        Lowest elevation tracked [rad].
-    cn0_sigma_db : float
-        White noise of the C/N0 that is output [dB].
-    rinex_steps : bool
-        Whether observations are rounded to the digits of a RINEX file.
-    """
+    """A kind of receiver with its antenna and site; `errors` are multipath and others with memory."""
 
     tracking: TrackingParams = TrackingParams()
     cn0: Cn0Model = Cn0Curve()
     errors: tuple[CorrelatedError, ...] = ()
     oscillator: OscillatorParams = OSCILLATORS["ocxo"]
     hardware: HardwareParams = HardwareParams()
-    elevation_mask_rad: float = math.radians(3.0)
-    cn0_sigma_db: float = 0.2
-    rinex_steps: bool = False
-
-    def __post_init__(self) -> None:
-        all_within("receiver", self, {"elevation_mask_rad": (0.0, 1.5), "cn0_sigma_db": (0.0, 10.0)})
+    elevation_mask_rad: Annotated[float, ELEVATION_MASK] = math.radians(3.0)
+    cn0_sigma_db: Annotated[float, CN0_SIGMA] = 0.2
+    rinex_steps: Annotated[bool, RINEX_STEPS] = False
 
 
 IDEAL: Final = ReceiverModel(

@@ -7,47 +7,34 @@ airborne presets. Carriers move by millimetres over minutes; the Doppler of that
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from typing import Annotated, Final, Literal
 
 import numpy as np
 
-from gbas_core.bounds import all_within, one_of
+from gbas_core.parameters import Parameter, parameters
 from gbas_core.record import FloatArray
 from gbas_core.signal.antenna import ANTENNAS
-from gbas_core.signal.rays import MATERIALS, Facet, RayErrors, Scene, box, ray_errors
+from gbas_core.signal.rays import MATERIAL, MATERIALS, Facet, RayErrors, Scene, box, ray_errors
 from gbas_sim.atmosphere.paths import SignalPaths, Station
 from gbas_sim.faults.fault_base import SignalEffect
 
+_SIZE_M: Final = (0.1, 10_000.0)
+_AWAY_M: Final = (-20_000.0, 20_000.0)
 
-@dataclass(frozen=True, kw_only=True)
+
+@parameters
 class Building:
-    """A box on the ground.
+    """A box on the ground."""
 
-    Attributes
-    ----------
-    east_m, north_m : float
-        Its middle, from the station [m].
-    length_m, width_m, height_m : float
-        Along its heading, across it, and up [m].
-    heading_rad : float
-        Clockwise from north [rad].
-    material : str
-        Name in :data:`gbas_core.signal.rays.MATERIALS`.
-    """
-
-    east_m: float
-    north_m: float
-    length_m: float
-    width_m: float
-    height_m: float
-    heading_rad: float = 0.0
-    material: str = "concrete"
-
-    def __post_init__(self) -> None:
-        bounds = dict.fromkeys(("length_m", "width_m", "height_m"), (0.1, 10_000.0))
-        all_within("building", self, bounds | dict.fromkeys(("east_m", "north_m"), (-20_000.0, 20_000.0)))
-        all_within("building", self, {"heading_rad": (-7.0, 7.0)})
-        one_of("building", "material", self.material, MATERIALS)
+    kind: Annotated[Literal["building"], Parameter("kind of the threat")] = "building"
+    east_m: Annotated[float, Parameter("its middle, east of the station", "m", *_AWAY_M)]
+    north_m: Annotated[float, Parameter("its middle, north of the station", "m", *_AWAY_M)]
+    length_m: Annotated[float, Parameter("along its heading", "m", *_SIZE_M)]
+    width_m: Annotated[float, Parameter("across its heading", "m", *_SIZE_M)]
+    height_m: Annotated[float, Parameter("up", "m", *_SIZE_M)]
+    heading_rad: Annotated[float, Parameter("clockwise from north", "deg", math.degrees(-7.0), math.degrees(7.0))] = 0.0
+    material: Annotated[str, MATERIAL] = "concrete"
 
     @property
     def facets(self) -> tuple[Facet, ...]:
@@ -60,29 +47,17 @@ class Building:
         )
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class SceneParams:
-    """The ground and the antennas on it.
+    """The ground and the antennas on it."""
 
-    Attributes
-    ----------
-    ground : str
-        Name in :data:`gbas_core.signal.rays.MATERIALS`; empty is ground that reflects nothing.
-    antenna : str
-        Name in :data:`gbas_core.signal.antenna.ANTENNAS`: how strong reflections are against the direct signal.
-    antenna_height_m : float
-        Above the ground [m].
-    """
-
-    ground: str = "ground"
-    antenna: str = "mla"
-    antenna_height_m: float = 3.0
-
-    def __post_init__(self) -> None:
-        if self.ground:
-            one_of("scene", "ground", self.ground, MATERIALS)
-        one_of("scene", "antenna", self.antenna, ANTENNAS)
-        all_within("scene", self, {"antenna_height_m": (0.1, 100.0)})
+    ground: Annotated[
+        str, Parameter("material of the ground; empty is ground that reflects nothing", choices=("", *MATERIALS))
+    ] = "ground"
+    antenna: Annotated[
+        str, Parameter("how strong reflections are against the direct signal", choices=tuple(ANTENNAS))
+    ] = "mla"
+    antenna_height_m: Annotated[float, Parameter("height of the antennas above the ground", "m", 0.1, 100.0)] = 3.0
 
 
 class SiteScene:

@@ -5,7 +5,7 @@ about, one subject a module: :mod:`segments` and :mod:`plan` say what is to be f
 and :mod:`reference` lay it out in time and space; :mod:`trim` finds the controls this takes and refuses what the
 aircraft cannot do; :mod:`guidance` steers along it and :mod:`motion` integrates the equations (:mod:`equations`) of an
 aircraft (:mod:`aircraft`, :mod:`fleet`) in the standard atmosphere (:mod:`atmosphere`), the wind (:mod:`wind`) and over
-the ellipsoid (:mod:`earth`); :mod:`attitude` turns motion and controls into attitude; :mod:`keys` reads files.
+the ellipsoid (:mod:`earth`); :mod:`attitude` turns motion and controls into attitude.
 
 Times are since the start of the flight. Vectors are ``(..., 3)``. Angles are radians; headings are true, clockwise from
 north; bank and roll are positive with the right wing down.
@@ -15,7 +15,6 @@ from gbas_sim.flight.dynamics.aircraft import Aircraft
 from gbas_sim.flight.dynamics.five_phase import five_phase_plan
 from gbas_sim.flight.dynamics.fleet import AIRLINER, FIGHTER, FLEET, SMALL_UAV
 from gbas_sim.flight.dynamics.flight import Flight, FlightState
-from gbas_sim.flight.dynamics.keys import flight_from_mapping
 from gbas_sim.flight.dynamics.plan import FlightPlan, Start
 from gbas_sim.flight.dynamics.reference import Phase
 from gbas_sim.flight.dynamics.segments import (
@@ -51,5 +50,4 @@ __all__ = [
     "Turn",
     "Wind",
     "five_phase_plan",
-    "flight_from_mapping",
 ]

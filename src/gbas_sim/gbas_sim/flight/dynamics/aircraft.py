@@ -10,90 +10,45 @@ Anderson, Aircraft Performance and Design (1999), chapters 2 and 3 (polar, prope
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
+from gbas_core.parameters import Parameter, parameters
 from gbas_core.record import FloatArray
 from gbas_sim.flight.dynamics.atmosphere import SEA_LEVEL_DENSITY_KGPM3, SEA_LEVEL_TEMPERATURE_K, Air
-from gbas_sim.flight.dynamics.bounds import check_bounds
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class Polar:
-    """Lift and drag of one configuration.
+    """Lift and drag of one configuration: C_D = C_D0 + k C_L^2."""
 
-    Attributes
-    ----------
-    lift_zero : float
-        Lift coefficient at zero angle of attack of the fuselage.
-    lift_slope_prad : float
-        Its slope [1/rad].
-    lift_max : float
-        Largest lift coefficient.
-    drag_zero, drag_induced : float
-        C_D0 and k of C_D = C_D0 + k C_L^2.
-    """
-
-    lift_zero: float
-    lift_slope_prad: float
-    lift_max: float
-    drag_zero: float
-    drag_induced: float
+    lift_zero: Annotated[float, Parameter("lift coefficient at zero angle of attack of the fuselage", "-", -1.0, 2.0)]
+    lift_slope_prad: Annotated[float, Parameter("its slope", "1/rad", 1.0, 8.0)]
+    lift_max: Annotated[float, Parameter("largest lift coefficient", "-", 0.3, 5.0)]
+    drag_zero: Annotated[float, Parameter("C_D0", "-", 0.005, 0.5)]
+    drag_induced: Annotated[float, Parameter("k", "-", 0.005, 0.5)]
 
     def __post_init__(self) -> None:
-        bounds = {
-            "lift_zero": (-1.0, 2.0),
-            "lift_slope_prad": (1.0, 8.0),
-            "lift_max": (0.3, 5.0),
-            "drag_zero": (0.005, 0.5),
-            "drag_induced": (0.005, 0.5),
-        }
-        check_bounds("aircraft: polar", self, bounds)
         if self.lift_max <= self.lift_zero:
             raise ValueError(f"aircraft: polar: lift_max = {self.lift_max!r} is not above lift_zero")
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class Jet:
     """Turbojet or turbofan, all engines together.
 
-    Attributes
-    ----------
-    thrust_n : float
-        Static thrust at sea level, without reheat [N].
-    mach_linear, mach_square : float
-        a and b of the factor 1 + a M + b M^2 on thrust.
-    density_exponent : float
-        n of the factor (density ratio)^n on thrust.
-    idle : float
-        Share of the largest thrust that is left when idling.
-    consumption_kgpns : float
-        Specific fuel consumption c0, static at sea level [kg/(N s)].
-    consumption_mach_kgpns : float
-        c1 of (c0 + c1 M) sqrt(temperature ratio) [kg/(N s)].
+    Thrust has the factor 1 + a M + b M^2 and (density ratio)^n; specific fuel consumption is (c0 + c1 M)
+    sqrt(temperature ratio).
     """
 
-    thrust_n: float
-    mach_linear: float = 0.0
-    mach_square: float = 0.0
-    density_exponent: float = 1.0
-    idle: float = 0.07
-    consumption_kgpns: float
-    consumption_mach_kgpns: float = 0.0
-
-    def __post_init__(self) -> None:
-        bounds = {
-            "thrust_n": (1.0, 3.0e6),
-            "mach_linear": (-2.0, 2.0),
-            "mach_square": (-2.0, 2.0),
-            "density_exponent": (0.0, 2.0),
-            "idle": (0.0, 0.5),
-            "consumption_kgpns": (0.0, 2.0e-4),
-            "consumption_mach_kgpns": (0.0, 2.0e-4),
-        }
-        check_bounds("aircraft: engine", self, bounds)
+    thrust_n: Annotated[float, Parameter("static thrust at sea level, without reheat", "N", 1.0, 3.0e6)]
+    mach_linear: Annotated[float, Parameter("a", "-", -2.0, 2.0)] = 0.0
+    mach_square: Annotated[float, Parameter("b", "-", -2.0, 2.0)] = 0.0
+    density_exponent: Annotated[float, Parameter("n", "-", 0.0, 2.0)] = 1.0
+    idle: Annotated[float, Parameter("share of the largest thrust that is left when idling", "-", 0.0, 0.5)] = 0.07
+    consumption_kgpns: Annotated[float, Parameter("c0, static at sea level", "kg/(N s)", 0.0, 2.0e-4)]
+    consumption_mach_kgpns: Annotated[float, Parameter("c1", "kg/(N s)", 0.0, 2.0e-4)] = 0.0
 
     def largest_thrust_n(self, airspeed_mps: FloatArray, air: Air) -> FloatArray:
         """Largest thrust (...) [N] at airspeeds (...) [m/s]."""
@@ -113,39 +68,15 @@ class Jet:
         return result
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class Propeller:
-    """Piston engine and propeller.
+    """Piston engine and propeller."""
 
-    Attributes
-    ----------
-    power_w : float
-        Shaft power at sea level [W]; it goes with density.
-    efficiency : float
-        Of the propeller.
-    static_thrust_n : float
-        Thrust standing still at sea level [N].
-    idle : float
-        Share of the largest thrust that is left when idling.
-    consumption_kgpj : float
-        Fuel per shaft work [kg/J].
-    """
-
-    power_w: float
-    efficiency: float = 0.7
-    static_thrust_n: float
-    idle: float = 0.0
-    consumption_kgpj: float
-
-    def __post_init__(self) -> None:
-        bounds = {
-            "power_w": (10.0, 1.0e7),
-            "efficiency": (0.1, 1.0),
-            "static_thrust_n": (1.0, 1.0e6),
-            "idle": (0.0, 0.5),
-            "consumption_kgpj": (0.0, 1.0e-6),
-        }
-        check_bounds("aircraft: engine", self, bounds)
+    power_w: Annotated[float, Parameter("shaft power at sea level; it goes with density", "W", 10.0, 1.0e7)]
+    efficiency: Annotated[float, Parameter("of the propeller", "-", 0.1, 1.0)] = 0.7
+    static_thrust_n: Annotated[float, Parameter("thrust standing still at sea level", "N", 1.0, 1.0e6)]
+    idle: Annotated[float, Parameter("share of the largest thrust that is left when idling", "-", 0.0, 0.5)] = 0.0
+    consumption_kgpj: Annotated[float, Parameter("fuel per shaft work", "kg/J", 0.0, 1.0e-6)]
 
     def largest_thrust_n(self, airspeed_mps: FloatArray, air: Air) -> FloatArray:
         """Largest thrust (...) [N]: power over speed, and the static thrust at none."""
@@ -160,104 +91,56 @@ class Propeller:
         return result
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class Response:
     """How fast the aircraft follows its guidance, and how firmly that holds it to the plan. Ours.
 
-    Attributes
-    ----------
-    bank_s, roll_s : float
-        Time constants of bank angle and roll rate [s].
-    lift_s, thrust_s : float
-        Time constants of the angle of attack and of thrust [s].
-    lateral_radps, vertical_radps, along_radps : float
-        Natural frequencies with which deviations across, above and along the plan decay, critically damped [rad/s].
+    Deviations from the plan decay with the natural frequencies, critically damped.
     """
 
-    bank_s: float
-    roll_s: float
-    lift_s: float
-    thrust_s: float
-    lateral_radps: float
-    vertical_radps: float
-    along_radps: float
+    bank_s: Annotated[float, Parameter("time constant of the bank angle", "s", 0.05, 5.0)]
+    roll_s: Annotated[float, Parameter("time constant of the roll rate", "s", 0.02, 2.0)]
+    lift_s: Annotated[float, Parameter("time constant of the angle of attack", "s", 0.05, 5.0)]
+    thrust_s: Annotated[float, Parameter("time constant of thrust", "s", 0.05, 10.0)]
+    lateral_radps: Annotated[float, Parameter("natural frequency across the plan", "rad/s", 0.01)]
+    vertical_radps: Annotated[float, Parameter("natural frequency above the plan", "rad/s", 0.01)]
+    along_radps: Annotated[float, Parameter("natural frequency along the plan", "rad/s", 0.01)]
 
     def __post_init__(self) -> None:
-        bounds = {
-            "bank_s": (0.05, 5.0),
-            "roll_s": (0.02, 2.0),
-            "lift_s": (0.05, 5.0),
-            "thrust_s": (0.05, 10.0),
-        }
-        check_bounds("aircraft: response", self, bounds)
         # Critically damped control through a lag t is stable up to 2/t; a quarter of that keeps it well damped.
         lags = {
             "lateral_radps": self.bank_s + self.roll_s,
             "vertical_radps": self.lift_s,
             "along_radps": self.thrust_s,
         }
-        check_bounds("aircraft: response", self, {key: (0.01, 0.5 / lag) for key, lag in lags.items()})
+        for key, lag in lags.items():
+            if getattr(self, key) > 0.5 / lag:
+                raise ValueError(
+                    f"aircraft: response: {key} = {getattr(self, key)!r} is not within 0.01 to {0.5 / lag:g}"
+                )
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class Limits:
-    """What the aircraft is not flown beyond.
+    """What the aircraft is not flown beyond."""
 
-    Attributes
-    ----------
-    bank_rad, roll_rate_radps : float
-        Largest bank angle [rad] and roll rate [rad/s].
-    load_factor_max, load_factor_min : float
-        Of the lift, in units of standard gravity.
-    mach : float
-        Largest Mach number.
-    height_m : float
-        Greatest height [m].
-    """
-
-    bank_rad: float
-    roll_rate_radps: float
-    load_factor_max: float
-    load_factor_min: float
-    mach: float
-    height_m: float
-
-    def __post_init__(self) -> None:
-        bounds = {
-            "bank_rad": (math.radians(5.0), math.radians(85.0)),
-            "roll_rate_radps": (math.radians(1.0), math.radians(400.0)),
-            "load_factor_max": (1.1, 12.0),
-            "load_factor_min": (-6.0, 0.9),
-            "mach": (0.05, 0.95),
-            "height_m": (100.0, 20_000.0),
-        }
-        check_bounds("aircraft: limits", self, bounds)
+    bank_rad: Annotated[float, Parameter("largest bank angle", "deg", 5.0, 85.0)]
+    roll_rate_radps: Annotated[float, Parameter("largest roll rate", "deg/s", 1.0, 400.0)]
+    load_factor_max: Annotated[float, Parameter("largest of the lift, in units of standard gravity", "g", 1.1, 12.0)]
+    load_factor_min: Annotated[float, Parameter("smallest of the lift", "g", -6.0, 0.9)]
+    mach: Annotated[float, Parameter("largest Mach number", "-", 0.05, 0.95)]
+    height_m: Annotated[float, Parameter("greatest height", "m", 100.0, 20000.0)]
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class Aircraft:
-    """An aircraft.
+    """An aircraft. Air brakes are out as far as the drag wanted is more than idling gives."""
 
-    Attributes
-    ----------
-    name : str
-    mass_kg, empty_mass_kg : float
-        At the start of the flight, and without fuel [kg].
-    wing_area_m2 : float
-        Reference area of the coefficients [m2].
-    brake_drag : float
-        Largest drag coefficient of the air brakes, which are out as far as the drag wanted is more than idling gives.
-    clean, landing : Polar
-    engine : Jet or Propeller
-    response : Response
-    limits : Limits
-    """
-
-    name: str
-    mass_kg: float
-    empty_mass_kg: float
-    wing_area_m2: float
-    brake_drag: float = 0.0
+    name: Annotated[str, Parameter("name of the aircraft")]
+    mass_kg: Annotated[float, Parameter("at the start of the flight", "kg", 0.5, 6.0e5)]
+    empty_mass_kg: Annotated[float, Parameter("without fuel", "kg", 0.1, 4.0e5)]
+    wing_area_m2: Annotated[float, Parameter("reference area of the coefficients", "m^2", 0.05, 1000.0)]
+    brake_drag: Annotated[float, Parameter("largest drag coefficient of the air brakes", "-", 0.0, 0.5)] = 0.0
     clean: Polar
     landing: Polar
     engine: Jet | Propeller
@@ -265,9 +148,6 @@ class Aircraft:
     limits: Limits
 
     def __post_init__(self) -> None:
-        bounds = {"mass_kg": (0.5, 6.0e5), "empty_mass_kg": (0.1, 4.0e5), "wing_area_m2": (0.05, 1000.0)}
-        bounds["brake_drag"] = (0.0, 0.5)
-        check_bounds("aircraft", self, bounds)
         if self.mass_kg < self.empty_mass_kg:
             raise ValueError(
                 f"aircraft: mass_kg = {self.mass_kg!r} is less than empty_mass_kg = {self.empty_mass_kg!r}"

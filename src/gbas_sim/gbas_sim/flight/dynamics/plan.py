@@ -2,72 +2,39 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
+from typing import Annotated
 
+from gbas_core.parameters import Parameter, parameters
 from gbas_core.positioning.approach import FinalApproach
-from gbas_sim.flight.dynamics.bounds import check_bounds
-from gbas_sim.flight.dynamics.segments import Approach, Configuration, MissedApproach, Segment
+from gbas_sim.flight.dynamics.segments import SPEED, Approach, Configuration, MissedApproach, Segment
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class Start:
-    """Where a flight that has no approach begins, straight and level.
+    """Where a flight that has no approach begins, straight and level."""
 
-    Attributes
-    ----------
-    latitude_rad, longitude_rad, height_m : float
-        Geodetic position [rad], height above the ellipsoid [m].
-    heading_rad : float
-        True heading [rad].
-    """
-
-    latitude_rad: float
-    longitude_rad: float
-    height_m: float
-    heading_rad: float
-
-    def __post_init__(self) -> None:
-        bounds = {
-            "latitude_rad": (math.radians(-85.0), math.radians(85.0)),
-            "longitude_rad": (-math.pi, math.pi),
-            "height_m": (-400.0, 20_000.0),
-            "heading_rad": (-2.0 * math.pi, 2.0 * math.pi),
-        }
-        check_bounds("start", self, bounds)
+    latitude_rad: Annotated[float, Parameter("geodetic latitude", "deg", -85.0, 85.0)]
+    longitude_rad: Annotated[float, Parameter("longitude", "deg", -180.0, 180.0)]
+    height_m: Annotated[float, Parameter("height above the ellipsoid", "m", -400.0, 20_000.0)]
+    heading_rad: Annotated[float, Parameter("true heading", "deg", -360.0, 360.0)]
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class FlightPlan:
     """Manoeuvres in the order they are flown.
 
-    A plan with an approach is laid out from the threshold, backwards to its start and onwards to its end; its start
-    follows. One without begins at `start`.
-
-    Attributes
-    ----------
-    segments : tuple of segments
-        At most one approach; only a missed approach may follow it, and anything may follow that.
-    speed_mps : float
-        Airspeed at the start.
-    configuration : str
-        At the start.
-    start : Start, optional
-        Without an approach.
-    approach : FinalApproach, optional
-        With one.
+    At most one is an approach; only a missed approach may follow it, and anything may follow that. A plan with an
+    approach is laid out from the threshold, backwards to its start and onwards to its end; its start follows. One
+    without begins at `start`.
     """
 
     segments: tuple[Segment, ...]
-    speed_mps: float
-    configuration: Configuration = "clean"
+    speed_mps: Annotated[float, SPEED]
+    configuration: Annotated[Configuration, Parameter("flaps and gear at the start")] = "clean"
     start: Start | None = None
     approach: FinalApproach | None = None
 
     def __post_init__(self) -> None:
-        check_bounds("plan", self, {"speed_mps": (5.0, 320.0)})
-        if self.configuration not in ("clean", "landing"):
-            raise ValueError(f"plan: configuration = {self.configuration!r} is not clean or landing")
         if not self.segments:
             raise ValueError("plan: segments is empty")
         approaches = [number for number, each in enumerate(self.segments) if isinstance(each, Approach)]

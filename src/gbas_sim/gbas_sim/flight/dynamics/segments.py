@@ -8,255 +8,166 @@ end.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Annotated, Final, Literal
 
-from gbas_sim.flight.dynamics.bounds import Bounds, check_bounds, check_one_of
+from pydantic import Field
+
+from gbas_core.parameters import Parameter, file_key, parameters
 
 Configuration = Literal["clean", "landing"]
 
-_SPEED: Final = (5.0, 320.0)
-_DURATION: Final = (1.0, 36_000.0)
-_VERTICAL: Final = (0.1, 150.0)
-_BLEND: Final = (1.0, 60.0)
-_ROLL: Final = (math.radians(1.0), math.radians(200.0))
-_TURN: Final = (-40.0 * math.pi, 40.0 * math.pi)
+SPEED: Final = Parameter("airspeed at the start", "m/s", 5.0, 320.0)
+_SPEED: Final = Parameter("airspeed at the end", "m/s", 5.0, 320.0)
+_CONFIGURATION: Final = Parameter("flaps and gear at the end")
+_DURATION: Final = Parameter("how long it takes", "s", 1.0, 36_000.0)
+_SLOPE_DURATION: Final = Parameter("from level to level again", "s", 1.0, 36_000.0)
+_VERTICAL: Final = Parameter("vertical speed that is held between", "m/s", 0.1, 150.0)
+_HEIGHT: Final = (1.0, 20_000.0)
+_BLEND: Final = Parameter("from level flight to the manoeuvre, and back", "s", 1.0, 60.0)
+_ROLL: Final = Parameter("largest roll rate when rolling in and out", "deg/s", 1.0, 200.0)
+_INTERCEPT: Final = Parameter(
+    "where level flight would meet the path, along the track from the threshold", "m", 200.0, 100_000.0
+)
+_APPROACH_SPEED: Final = Parameter("airspeed down the path", "m/s", 5.0, 320.0)
+_LEVEL: Final = Parameter("in level flight before the path, in which speed and configuration change", "s", 0.0, 3600.0)
+_PUSHOVER: Final = Parameter("from level flight to the path's slope", "s", 1.0, 60.0)
 
 
-def _check(segment: Segment, bounds: Bounds) -> None:
-    check_bounds(segment.kind, segment, {"speed_mps": _SPEED, **bounds})
-    configuration = getattr(segment, "configuration", None)
-    if configuration not in (None, "clean", "landing"):
-        raise ValueError(f"{segment.kind}: configuration = {configuration!r} is not clean or landing")
+def _one_of(owner: object, *keys: str) -> None:
+    """Refuse a manoeuvre that has not exactly one of some keys."""
+    given = [file_key(key) for key in keys if getattr(owner, key) is not None]
+    if len(given) != 1:
+        problem = f"{given[0]} and {given[1]} are" if given else "neither is"
+        raise ValueError(f"{problem} given, exactly one of {' and '.join(file_key(key) for key in keys)} must be")
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class Cruise:
-    """Straight and level.
+    """Straight and level."""
 
-    Attributes
-    ----------
-    duration_s : float
-    speed_mps : float, optional
-        At the end.
-    configuration : str, optional
-        ``"clean"`` or ``"landing"``, at the end.
-    """
-
-    kind = "cruise"
-    duration_s: float
-    speed_mps: float | None = None
-    configuration: Configuration | None = None
-
-    def __post_init__(self) -> None:
-        _check(self, {"duration_s": _DURATION})
+    kind: Annotated[Literal["cruise"], Parameter("kind of the manoeuvre")] = "cruise"
+    duration_s: Annotated[float, _DURATION]
+    speed_mps: Annotated[float | None, _SPEED] = None
+    configuration: Annotated[Configuration | None, _CONFIGURATION] = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class Climb:
-    """Straight climb.
+    """Straight climb, by its duration or its vertical speed."""
 
-    Attributes
-    ----------
-    height_gain_m : float
-    duration_s, vertical_speed_mps : float
-        One of the two: from level to level again, or what is held between.
-    blend_s : float
-        From level to the climb, and back.
-    speed_mps, configuration
-        See :class:`Cruise`.
-    """
-
-    kind = "climb"
-    height_gain_m: float
-    duration_s: float | None = None
-    vertical_speed_mps: float | None = None
-    blend_s: float = 10.0
-    speed_mps: float | None = None
-    configuration: Configuration | None = None
+    kind: Annotated[Literal["climb"], Parameter("kind of the manoeuvre")] = "climb"
+    height_gain_m: Annotated[float, Parameter("height gain", "m", *_HEIGHT)]
+    duration_s: Annotated[float | None, _SLOPE_DURATION] = None
+    vertical_speed_mps: Annotated[float | None, _VERTICAL] = None
+    blend_s: Annotated[float, _BLEND] = 10.0
+    speed_mps: Annotated[float | None, _SPEED] = None
+    configuration: Annotated[Configuration | None, _CONFIGURATION] = None
 
     def __post_init__(self) -> None:
-        bounds = {"height_gain_m": (1.0, 20_000.0), "duration_s": _DURATION, "blend_s": _BLEND}
-        _check(self, bounds | {"vertical_speed_mps": _VERTICAL})
-        check_one_of(self.kind, self, "duration_s", "vertical_speed_mps")
+        _one_of(self, "duration_s", "vertical_speed_mps")
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class Descent:
-    """Straight descent by ``height_loss_m``; the rest as in :class:`Climb`."""
+    """Straight descent, by its duration or its vertical speed."""
 
-    kind = "descent"
-    height_loss_m: float
-    duration_s: float | None = None
-    vertical_speed_mps: float | None = None
-    blend_s: float = 10.0
-    speed_mps: float | None = None
-    configuration: Configuration | None = None
+    kind: Annotated[Literal["descent"], Parameter("kind of the manoeuvre")] = "descent"
+    height_loss_m: Annotated[float, Parameter("height loss", "m", *_HEIGHT)]
+    duration_s: Annotated[float | None, _SLOPE_DURATION] = None
+    vertical_speed_mps: Annotated[float | None, _VERTICAL] = None
+    blend_s: Annotated[float, _BLEND] = 10.0
+    speed_mps: Annotated[float | None, _SPEED] = None
+    configuration: Annotated[Configuration | None, _CONFIGURATION] = None
 
     def __post_init__(self) -> None:
-        bounds = {"height_loss_m": (1.0, 20_000.0), "duration_s": _DURATION, "blend_s": _BLEND}
-        _check(self, bounds | {"vertical_speed_mps": _VERTICAL})
-        check_one_of(self.kind, self, "duration_s", "vertical_speed_mps")
+        _one_of(self, "duration_s", "vertical_speed_mps")
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class Turn:
-    """Turn through the air at a steady rate, level, climbing or descending.
+    """Turn through the air at a steady rate, level, climbing or descending, by its bank or its duration.
 
-    Attributes
-    ----------
-    heading_change_rad : float
-        To the right if positive; may be several turns [rad].
-    bank_rad, duration_s : float
-        One of the two. The bank is that at the mean of the speeds before and after, in level flight.
-    height_change_m : float
-        Spread over the whole turn [m].
-    roll_rate_radps : float
-        Largest when rolling in and out [rad/s].
-    blend_s, speed_mps, configuration
-        See :class:`Climb`.
+    The bank is that at the mean of the speeds before and after, in level flight.
     """
 
-    kind = "turn"
-    heading_change_rad: float
-    bank_rad: float | None = None
-    duration_s: float | None = None
-    height_change_m: float = 0.0
-    roll_rate_radps: float = math.radians(8.0)
-    blend_s: float = 10.0
-    speed_mps: float | None = None
-    configuration: Configuration | None = None
+    kind: Annotated[Literal["turn"], Parameter("kind of the manoeuvre")] = "turn"
+    heading_change_rad: Annotated[
+        float, Parameter("to the right if positive; may be several turns", "deg", -7200.0, 7200.0)
+    ]
+    bank_rad: Annotated[float | None, Parameter("bank angle", "deg", 1.0, 80.0)] = None
+    duration_s: Annotated[float | None, _DURATION] = None
+    height_change_m: Annotated[float, Parameter("spread over the whole turn", "m", -20_000.0, 20_000.0)] = 0.0
+    roll_rate_radps: Annotated[float, _ROLL] = math.radians(8.0)
+    blend_s: Annotated[float, _BLEND] = 10.0
+    speed_mps: Annotated[float | None, _SPEED] = None
+    configuration: Annotated[Configuration | None, _CONFIGURATION] = None
 
     def __post_init__(self) -> None:
-        bounds = {
-            "heading_change_rad": _TURN,
-            "bank_rad": (math.radians(1.0), math.radians(80.0)),
-            "duration_s": _DURATION,
-            "height_change_m": (-20_000.0, 20_000.0),
-            "roll_rate_radps": _ROLL,
-            "blend_s": _BLEND,
-        }
-        _check(self, bounds)
-        check_one_of(self.kind, self, "bank_rad", "duration_s")
+        _one_of(self, "bank_rad", "duration_s")
         if self.heading_change_rad == 0.0:
-            raise ValueError("turn: heading_change_rad is 0")
+            raise ValueError("heading_change_deg is 0")
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class StraightInApproach:
     """Level on the extended course, then down the final approach path to the threshold.
 
-    Attributes
-    ----------
-    speed_mps : float
-        Through the air, down the path.
-    intercept_distance_m, duration_s : float
-        One of the two: where level flight would meet the path, along the ground from the threshold, or how long the
-        manoeuvre takes.
-    level_time_s : float
-        In level flight before the path, in which speed and configuration change.
-    pushover_time_s : float
-        From level flight to the path's slope.
+    Laid out by the distance of its intercept or by its duration.
     """
 
-    kind = "straight_in"
-    speed_mps: float
-    intercept_distance_m: float | None = None
-    duration_s: float | None = None
-    level_time_s: float = 60.0
-    pushover_time_s: float = 10.0
+    kind: Annotated[Literal["straight_in"], Parameter("kind of the manoeuvre")] = "straight_in"
+    speed_mps: Annotated[float, _APPROACH_SPEED]
+    intercept_distance_m: Annotated[float | None, _INTERCEPT] = None
+    duration_s: Annotated[float | None, _DURATION] = None
+    level_time_s: Annotated[float, _LEVEL] = 60.0
+    pushover_time_s: Annotated[float, _PUSHOVER] = 10.0
 
     def __post_init__(self) -> None:
-        _check(self, _APPROACH_BOUNDS)
-        check_one_of(self.kind, self, "intercept_distance_m", "duration_s")
+        _one_of(self, "intercept_distance_m", "duration_s")
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class CurvedApproach:
     """A turn over the ground with a fixed radius (as a radius-to-fix leg) that ends on the final approach.
 
-    Attributes
-    ----------
-    turn_rad : float
-        By how much the course changes, to the right if positive [rad].
-    radius_m : float
-    join_distance_m : float
-        From the threshold to where the turn ends [m].
-    roll_rate_radps : float
-        Largest when rolling in and out; the curvature of the track grows and shrinks with it [rad/s].
-    speed_mps, intercept_distance_m, duration_s, level_time_s, pushover_time_s
-        See :class:`StraightInApproach`. Distances are along the track; the descent may begin in the turn or before it.
+    The curvature of the track grows and shrinks with the roll rate. The descent may begin in the turn or before it.
     """
 
-    kind = "curved"
-    turn_rad: float
-    radius_m: float
-    join_distance_m: float
-    roll_rate_radps: float = math.radians(5.0)
-    speed_mps: float
-    intercept_distance_m: float | None = None
-    duration_s: float | None = None
-    level_time_s: float = 60.0
-    pushover_time_s: float = 10.0
+    kind: Annotated[Literal["curved"], Parameter("kind of the manoeuvre")] = "curved"
+    turn_rad: Annotated[
+        float, Parameter("by how much the course changes, to the right if positive", "deg", -270.0, 270.0)
+    ]
+    radius_m: Annotated[float, Parameter("radius of the turn", "m", 50.0, 50_000.0)]
+    join_distance_m: Annotated[float, Parameter("from the threshold to where the turn ends", "m", 0.0, 50_000.0)]
+    roll_rate_radps: Annotated[float, _ROLL] = math.radians(5.0)
+    speed_mps: Annotated[float, _APPROACH_SPEED]
+    intercept_distance_m: Annotated[float | None, _INTERCEPT] = None
+    duration_s: Annotated[float | None, _DURATION] = None
+    level_time_s: Annotated[float, _LEVEL] = 60.0
+    pushover_time_s: Annotated[float, _PUSHOVER] = 10.0
 
     def __post_init__(self) -> None:
-        bounds = {
-            "turn_rad": (-1.5 * math.pi, 1.5 * math.pi),
-            "radius_m": (50.0, 50_000.0),
-            "join_distance_m": (0.0, 50_000.0),
-            "roll_rate_radps": _ROLL,
-        }
-        _check(self, {**_APPROACH_BOUNDS, **bounds})
-        check_one_of(self.kind, self, "intercept_distance_m", "duration_s")
+        _one_of(self, "intercept_distance_m", "duration_s")
         if self.turn_rad == 0.0:
-            raise ValueError("curved: turn_rad is 0")
+            raise ValueError("turn_deg is 0")
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class MissedApproach:
-    """Go around from the final approach, straight ahead, to level flight.
+    """Go around from the final approach, straight ahead, to level flight."""
 
-    Attributes
-    ----------
-    from_height_m : float
-        Height of the path above the threshold at which the approach is given up [m].
-    height_gain_m : float
-        From there to level flight [m].
-    vertical_speed_mps : float
-        Of the climb.
-    blend_s, speed_mps, configuration
-        See :class:`Climb`.
-    """
+    kind: Annotated[Literal["missed_approach"], Parameter("kind of the manoeuvre")] = "missed_approach"
+    from_height_m: Annotated[
+        float, Parameter("height of the path above the threshold where the approach is given up", "m", 5.0, 1000.0)
+    ]
+    height_gain_m: Annotated[float, Parameter("from there to level flight", "m", 50.0, 5000.0)]
+    vertical_speed_mps: Annotated[float, Parameter("of the climb", "m/s", 0.1, 150.0)]
+    blend_s: Annotated[float, _BLEND] = 8.0
+    speed_mps: Annotated[float | None, _SPEED] = None
+    configuration: Annotated[Configuration | None, _CONFIGURATION] = "clean"
 
-    kind = "missed_approach"
-    from_height_m: float
-    height_gain_m: float
-    vertical_speed_mps: float
-    blend_s: float = 8.0
-    speed_mps: float | None = None
-    configuration: Configuration | None = "clean"
-
-    def __post_init__(self) -> None:
-        bounds = {
-            "from_height_m": (5.0, 1000.0),
-            "height_gain_m": (50.0, 5000.0),
-            "vertical_speed_mps": _VERTICAL,
-            "blend_s": _BLEND,
-        }
-        _check(self, bounds)
-
-
-_APPROACH_BOUNDS: Final[Bounds] = {
-    "intercept_distance_m": (200.0, 100_000.0),
-    "duration_s": _DURATION,
-    "level_time_s": (0.0, 3600.0),
-    "pushover_time_s": (1.0, 60.0),
-}
 
 Approach = StraightInApproach | CurvedApproach
-Segment = Cruise | Climb | Descent | Turn | StraightInApproach | CurvedApproach | MissedApproach
-KINDS: Final[dict[str, type[Segment]]] = {
-    segment.kind: segment
-    for segment in (Cruise, Climb, Descent, Turn, StraightInApproach, CurvedApproach, MissedApproach)
-}
-"""Manoeuvres by the name files give them."""
+Segment = Annotated[
+    Cruise | Climb | Descent | Turn | StraightInApproach | CurvedApproach | MissedApproach, Field(discriminator="kind")
+]

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
-from typing import Final
+from typing import Annotated, Final
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
+from gbas_core.parameters import Parameter, parameters
 from gbas_core.record import FloatArray
 from gbas_sim.flight.dynamics.smooth import SmoothTable
 
@@ -17,36 +17,24 @@ _SPACING_M: Final = 20.0
 _MARGIN_M: Final = 1000.0
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class Wind:
-    """Horizontal wind, steady in time, between given heights along a monotone cubic curve.
+    """Horizontal wind, steady in time, between given heights along a monotone cubic curve; no heights: calm."""
 
-    Attributes
-    ----------
-    height_m : tuple of float
-        Heights above the ellipsoid, growing [m]; none: calm.
-    speed_mps : tuple of float
-        Speed at each of them [m/s].
-    from_rad : tuple of float
-        Where it blows from, clockwise from true north [rad].
-    """
-
-    height_m: tuple[float, ...] = ()
-    speed_mps: tuple[float, ...] = ()
-    from_rad: tuple[float, ...] = ()
+    height_m: Annotated[
+        tuple[float, ...], Parameter("heights above the ellipsoid, growing", "m", -1000.0, 30_000.0)
+    ] = ()
+    speed_mps: Annotated[tuple[float, ...], Parameter("speed at each of them", "m/s", 0.0, 150.0)] = ()
+    from_rad: Annotated[
+        tuple[float, ...], Parameter("where it blows from, clockwise from true north", "deg", -360.0, 360.0)
+    ] = ()
 
     def __post_init__(self) -> None:
         if not len(self.height_m) == len(self.speed_mps) == len(self.from_rad):
             counts = f"{len(self.height_m)}, {len(self.speed_mps)} and {len(self.from_rad)}"
-            raise ValueError(f"wind: height_m, speed_mps and from_rad have {counts} values, not as many")
-        if not all(-1000.0 <= height <= 30_000.0 for height in self.height_m):
-            raise ValueError(f"wind: height_m = {self.height_m!r} is not within -1000 to 30000")
+            raise ValueError(f"height_m, speed_mps and from_deg have {counts} values, not as many")
         if any(high - low < 1.0 for low, high in zip(self.height_m, self.height_m[1:], strict=False)):
-            raise ValueError(f"wind: height_m = {self.height_m!r} does not grow by at least 1")
-        if not all(0.0 <= speed <= 150.0 for speed in self.speed_mps):
-            raise ValueError(f"wind: speed_mps = {self.speed_mps!r} is not within 0 to 150")
-        if not all(-2.0 * np.pi <= angle <= 2.0 * np.pi for angle in self.from_rad):
-            raise ValueError(f"wind: from_rad = {self.from_rad!r} is not within one turn")
+            raise ValueError(f"height_m = {self.height_m!r} does not grow by at least 1")
 
     @classmethod
     def constant(cls, *, speed_mps: float, from_rad: float) -> Wind:
