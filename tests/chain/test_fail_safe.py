@@ -397,7 +397,7 @@ def test_epochs_twice_and_out_of_order(scenes, name):
 
 def one_ephemeris(scene: Scene, satellite: int, received: int, **values: float) -> Ephemeris:
     """The ephemeris in use of one satellite, received again at an epoch with some fields changed."""
-    current = scene.chain._ground_state.monitor.ephemerides.current
+    current = scene.chain._ground_state.integrity.receive.ephemerides.current
     columns = {name: np.where(np.arange(N_SATS) == satellite, getattr(current, name), np.nan) for name in FIELDS}
     for name, value in values.items():
         columns[name][satellite] = value
@@ -412,7 +412,7 @@ def damage_ephemeris(scenes, case):
     name, field, factor, ends, satellite, more = case
     scene = scenes[name]
     chosen = int(scene.satellites()[satellite % len(scene.satellites())])
-    value = float(getattr(scene.chain._ground_state.monitor.ephemerides.current, field)[chosen])
+    value = float(getattr(scene.chain._ground_state.integrity.receive.ephemerides.current, field)[chosen])
     with np.errstate(over="ignore", invalid="ignore"):
         bad = one_ephemeris(scene, chosen, 3, **{field: np.float64(value) * factor + more})
     safe(
@@ -471,7 +471,7 @@ def test_an_ephemeris_that_changes_under_its_issue_of_data(scenes, request, fiel
     scene = scenes["gps"]
     every = scene.satellites()
     for satellite in every if request.node.get_closest_marker("campaign") else every[:3]:
-        current = getattr(scene.chain._ground_state.monitor.ephemerides.current, field)
+        current = getattr(scene.chain._ground_state.integrity.receive.ephemerides.current, field)
         bad = one_ephemeris(scene, satellite, 3, **{field: current[satellite] + SMALL_CHANGES[field]})
         ends = {"both": ("ground", "user")}.get(end, (end,))
         outcome = safe(scene.run(**{f"{name}_ephemerides": [bad] for name in ends}))
@@ -498,7 +498,7 @@ def test_a_satellite_becomes_unhealthy(scenes, name, end):
 def test_ephemerides_that_expire(scenes, monkeypatch):
     """Their validity ends (here early) and nothing new comes: the satellites go, and with them the service."""
     scene = scenes["four"]
-    toe_s = np.nanmax(scene.chain._ground_state.monitor.ephemerides.current.toe_tow_s)
+    toe_s = np.nanmax(scene.chain._ground_state.integrity.receive.ephemerides.current.toe_tow_s)
     until = from_epoch_key(scene.epochs[FAULT].key)[1]
     monkeypatch.setattr("gbas_core.gnss.ephemeris.VALIDITY_S", np.full(N_SATS, until - toe_s - 0.1))
     outcome = safe(scene.run(count=20))
