@@ -201,7 +201,8 @@ def test_messages_of_a_full_station():
 def test_reference_point_and_receivers():
     station = params(3)
     latitude, longitude, height = geodetic_from_ecef(station.reference_point_m())
-    assert (latitude, longitude) == pytest.approx((station.station.latitude_rad, station.station.longitude_rad), abs=1e-12)
+    place = (station.station.latitude_rad, station.station.longitude_rad)
+    assert (latitude, longitude) == pytest.approx(place, abs=1e-12)
     assert height == pytest.approx(station.station.height_m, abs=1e-6)  # rounding of 6e6 m through the transformation
     assert station.receiver_positions_m().shape == (3, 3)
     assert np.linalg.norm(station.receiver_positions_m() - station.reference_point_m(), axis=1).max() < 600.0
