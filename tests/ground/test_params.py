@@ -47,7 +47,7 @@ def test_smallest_configuration_claims_nothing():
 
 def test_angles_are_degrees_in_files_only():
     station = GroundParams.from_mapping(changed(monitors={"elevation_mask_deg": 7.5}))
-    assert station.latitude_rad == pytest.approx(math.radians(52.32), abs=1e-15)
+    assert station.station.latitude_rad == pytest.approx(math.radians(52.32), abs=1e-15)
     assert station.monitors.elevation_mask_rad == pytest.approx(math.radians(7.5), abs=1e-15)
     assert GroundParams.from_mapping(MINIMAL).monitors.elevation_mask_rad == pytest.approx(math.radians(5.0), abs=1e-15)
 
@@ -201,7 +201,9 @@ def test_messages_of_a_full_station():
 def test_reference_point_and_receivers():
     station = params(3)
     latitude, longitude, height = geodetic_from_ecef(station.reference_point_m())
-    assert (latitude, longitude) == pytest.approx((station.latitude_rad, station.longitude_rad), abs=1e-12)
-    assert height == pytest.approx(station.height_m, abs=1e-6)  # rounding of 6e6 m through the transformation
+    assert (latitude, longitude) == pytest.approx(
+        (station.station.latitude_rad, station.station.longitude_rad), abs=1e-12
+    )
+    assert height == pytest.approx(station.station.height_m, abs=1e-6)  # rounding of 6e6 m through the transformation
     assert station.receiver_positions_m().shape == (3, 3)
     assert np.linalg.norm(station.receiver_positions_m() - station.reference_point_m(), axis=1).max() < 600.0
