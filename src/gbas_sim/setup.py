@@ -16,7 +16,7 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         (f"share/{PACKAGE}", ["package.xml"]),
     ],
-    install_requires=["gbas_core", "gbas_msgs_py", "gbas_node", "numpy", "scipy", "PyYAML"],
+    install_requires=["gbas_core", "gbas_msgs_py", "gbas_node", "numpy", "pydantic", "scipy"],
     zip_safe=True,
     entry_points={"console_scripts": ["simulator = gbas_sim.nodes.simulator:main"]},
 )
