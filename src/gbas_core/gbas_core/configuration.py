@@ -7,6 +7,7 @@ beside it; a key without a value takes the file's away. A key that stands twice 
 from __future__ import annotations
 
 import functools
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -93,7 +94,7 @@ def read_configuration(path: str | Path) -> Configuration:
         if base is not None and (not isinstance(base, str) or len(layers) >= _MOST_BASES):
             raise ParameterError(f"{place}: {BASE} = {base!r} is not a file, or files are based on each other")
         layers.append((place, {key: value for key, value in own.items() if key != BASE}))
-        place = None if base is None else place.parent / base
+        place = None if base is None else Path(os.path.normpath(place.parent / base))
     return Configuration(layers=tuple(layers))
 
 
