@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import FrozenInstanceError, replace
+from dataclasses import FrozenInstanceError, field, replace
 from typing import Annotated, Any, Literal
 
 import pytest
+from pydantic import Discriminator, Field, Tag
 
 from gbas_core.parameters import (
+    Numbered,
     Parameter,
     ParameterError,
     declared,
@@ -141,3 +143,119 @@ def test_json_schema_has_bounds_units_and_defaults_of_files() -> None:
     assert filters["form"]["enum"] == ["full_rank", "published"]
     assert schema["required"] == ["name"]
     assert schema["additionalProperties"] is False
+
+
+# --- sections of several kinds
+
+
+@parameters
+class Wall:
+    """A wall."""
+
+    kind: Annotated[Literal["wall"], Parameter("kind of the thing")] = "wall"
+    width_m: Annotated[float, Parameter("its width", "m", 0.0, 10.0)]
+    material: Annotated[str, Parameter("what it is of", choices=("", "brick", "wood"))] = ""
+
+
+@parameters
+class Gate:
+    """A gate."""
+
+    kind: Annotated[Literal["gate"], Parameter("kind of the thing")] = "gate"
+    open_rad: Annotated[float, Parameter("how far it is open", "deg", 0.0, 90.0)] = 0.0
+
+    def __post_init__(self) -> None:
+        if self.open_rad == math.radians(45.0):
+            raise ValueError("it sticks")
+
+
+Thing = Annotated[Wall | Gate, Field(discriminator="kind")]
+
+
+def _has_stones(section: Any) -> str:
+    return "with" if isinstance(section, Stones) or (isinstance(section, dict) and "stones" in section) else "without"
+
+
+@parameters
+class Stones:
+    """A way of stones."""
+
+    stones: Annotated[int, Parameter("how many", "-", 1, 9)]
+
+
+@parameters
+class Garden:
+    """A garden."""
+
+    things: dict[str, Thing] = field(default_factory=dict)
+    row: Annotated[tuple[Thing, ...], Numbered()] = ()
+    gate: Gate | None = None
+    way: Annotated[Annotated[Stones, Tag("with")] | Annotated[Filters, Tag("without")], Discriminator(_has_stones)] = (
+        Filters()
+    )
+
+
+def garden(**mapping: Any) -> Garden:
+    return from_mapping(Garden, mapping, source="a.yaml", section="garden")
+
+
+def test_sections_of_several_kinds_are_read_by_name_in_order_and_dotted() -> None:
+    wall, gate = {"kind": "wall", "width_m": 2}, {"kind": "gate", "open_deg": 30}
+    made = garden(things={"a": wall, "b": gate}, row={2: gate, 1: wall}, way={"stones": 3})
+    assert made.things == {"a": Wall(width_m=2.0), "b": Gate(open_rad=math.radians(30.0))}
+    assert made.row == (made.things["a"], made.things["b"])
+    assert garden(row=[wall, gate]).row == made.row
+    assert garden(**{"things.a.kind": "wall", "things.a.width_m": 2, "row.1.kind": "gate"}).row == (Gate(),)
+    assert replace(made, gate=Gate()).things == made.things
+    assert made.way == Stones(stones=3)
+
+
+@pytest.mark.parametrize(
+    ("mapping", "words"),
+    [
+        ({"things": 3}, "things = 3 is not a section of keys"),
+        ({"things": {"a": 3}}, "things.a = 3 is not a section of keys"),
+        ({"things": {"a": {"kind": "tree"}}}, "things.a.kind = 'tree' is not one of wall, gate"),
+        ({"things": {"a": {"width_m": 1}}}, "things.a.kind is missing"),
+        ({"things": {"a": {"kind": "wall"}}}, "things.a.width_m is missing (its width)"),
+        ({"things": {"a": {"kind": "wall", "width_m": 11}}}, "things.a.width_m = 11 is not within 0 to 10 m"),
+        ({"things": {"a": {"kind": "wall", "with_m": 1}}}, "things.a.with_m is unknown; did you mean 'width_m'?"),
+        ({"things": {"a": {"kind": "gate", "opn_deg": 1}}}, "things.a.opn_deg is unknown; did you mean 'open_deg'?"),
+        ({"things": {"a": {"kind": "gate", "open_deg": 45}}}, "things.a: it sticks"),
+        (
+            {"things": {"a": {"kind": "wall", "width_m": 1, "material": "tin"}}},
+            "things.a.material = 'tin' is not one of brick, wood",
+        ),
+        ({"row": [{"kind": "gate"}, {"kind": "gate", "open_deg": 91}]}, "row.2.open_deg = 91 is not within 0 to 90"),
+        ({"row": {1: {"kind": "gate"}, 3: {"kind": "gate"}}}, "row = keys 1, 3, not 1 to 2"),
+        ({"row": 3}, "row = 3 is not a list"),
+        ({"row": [3]}, "row.1 = 3 is not a section of keys"),
+        ({"gate": {"open_deg": "wide"}}, "gate.open_deg = 'wide' is not a number"),
+        ({"way": {"stones": 10}}, "way.stones = 10 is not within 1 to 9"),
+        ({"way": {"tau_s": 0.5}}, "way.tau_s = 0.5 is not within 1 to 1000 s"),
+    ],
+)
+def test_what_is_wrong_in_such_a_section_is_named_as_in_a_file(mapping: dict[str, Any], words: str) -> None:
+    with pytest.raises(ParameterError) as caught:
+        garden(**mapping)
+    assert str(caught.value).startswith(f"a.yaml: garden.{words}")
+
+
+def test_what_such_sections_declare() -> None:
+    made = garden(things={"a": {"kind": "gate", "open_deg": 30}}, row=[{"kind": "wall", "width_m": 2}])
+    found = {each.key: each.value for each in declared(made)}
+    assert found["things.a.open_deg"] == 30.0
+    assert found["row.1.width_m"] == 2.0
+    assert not any(key.startswith("gate.") for key in found)
+    known = {each.key for each in declared(Garden)}
+    assert {"things.NAME.width_m", "things.NAME.open_deg", "row.1.kind", "gate.open_deg", "way.tau_s"} <= known
+
+
+def test_json_schema_of_such_sections() -> None:
+    schema = json_schema(Garden)
+    wall = schema["$defs"]["Wall"]
+    assert set(wall["required"]) == {"kind", "width_m"}
+    assert wall["properties"]["kind"]["const"] == "wall"
+    assert wall["properties"]["material"]["enum"] == ["", "brick", "wood"]
+    assert len(schema["properties"]["things"]["additionalProperties"]["oneOf"]) == 2
+    assert [each["type"] for each in schema["properties"]["row"]["anyOf"]] == ["array", "object"]

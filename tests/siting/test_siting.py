@@ -324,7 +324,7 @@ def test_everything_stands_already():
         ({"n_receivers": 2, "existing_m": ((0.0, 0.0),) * 3}, "existing"),
         ({"existing_m": ((0.0, math.nan),)}, "existing"),
         ({"runway_bearing_rad": math.inf}, "bearing"),
-        ({"k": 0.0}, "'k'"),
+        ({"k": 0.0}, "k = 0.0 is not above 0"),
         ({"baselines": "ring"}, "baselines"),
         ({"tolerance_m": -1.0}, "tolerance_m"),
         ({"max_length_m": 0.0}, "max_length_m"),

@@ -8,6 +8,7 @@ file below says, so every key may be null.
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from typing import Any, Final
 
 from gbas_bringup.node_kinds import NODE_KINDS
@@ -99,7 +100,7 @@ def _together(schema: Any, definitions: dict[str, Any]) -> Any:
         return schema
     if "oneOf" not in schema or "discriminator" in schema:
         return {key: _together(each, definitions) for key, each in schema.items()}
-    kinds = [definitions[each["$ref"].removeprefix("#/$defs/")]["properties"] for each in schema["oneOf"]]
+    kinds = [definitions[each.removeprefix("#/$defs/")]["properties"] for each in _references(schema)]
     properties = {}
     for key in {key: None for kind in kinds for key in kind}:
         found = [kind[key] for kind in kinds if key in kind]
@@ -107,6 +108,15 @@ def _together(schema: Any, definitions: dict[str, Any]) -> Any:
         properties[key] = distinct[0] if len(distinct) == 1 else {"anyOf": distinct}
     rest = {key: each for key, each in schema.items() if key != "oneOf"}
     return rest | {"type": "object", "properties": properties, "additionalProperties": False}
+
+
+def _references(schema: dict[str, Any]) -> Iterator[str]:
+    """References to the kinds of a section, those of kinds of kinds included."""
+    for each in schema["oneOf"]:
+        if "oneOf" in each:
+            yield from _references(each)
+        else:
+            yield each["$ref"]
 
 
 def _open(schema: dict[str, Any], name: str, *, in_list: bool = False) -> dict[str, Any]:

@@ -35,7 +35,7 @@ from typing import Any, Final, TypeVar, dataclass_transform
 
 import pydantic.dataclasses
 import pydantic_core
-from pydantic import ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler, TypeAdapter, ValidationError
+from pydantic import ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler, Tag, TypeAdapter, ValidationError
 from pydantic.dataclasses import is_pydantic_dataclass
 from pydantic.json_schema import GenerateJsonSchema
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
@@ -175,18 +175,19 @@ class Parameter:
 
     def known(self) -> str:
         """The choices in words; the first and the last of many."""
-        few = len(self.choices) <= _MOST_SHOWN
-        return ", ".join(self.choices if few else (*self.choices[:2], "...", self.choices[-1]))
+        names = [name for name in self.choices if name]
+        shown = names if len(names) <= _MOST_SHOWN else [*names[:2], "...", names[-1]]
+        return ("; " if any("," in name for name in names) else ", ").join(shown)
 
     def bounds(self) -> str:
         """Bounds and unit in words."""
         unit = "" if self.unit == "-" else f" {self.unit}"
         if self.high is None or math.isinf(self.high):
-            return f"{self.low:.8g}{unit} or more"
+            return f"{self.low:.10g}{unit} or more"
         return (
-            f"within {self.low:.8g} to {self.high:.8g}{unit}"
+            f"within {self.low:.10g} to {self.high:.10g}{unit}"
             if self.low is not None
-            else f"{self.high:.8g}{unit} or less"
+            else f"{self.high:.10g}{unit} or less"
         )
 
 
@@ -608,7 +609,7 @@ def _along(kind: Any, loc: tuple[int | str, ...]) -> tuple[list[str], Any]:
             if any(dataclasses.is_dataclass(inner) for inner in _classes(kind)):
                 keys.append(str(each + 1))
         else:  # which of the kinds of a section it is
-            kind = next((member for member in _classes(kind) if each in _tags(member)), kind)
+            kind = _told(kind, str(each))
     return keys, _bare(kind)
 
 
@@ -620,6 +621,14 @@ def _bare(hint: Any) -> Any:
         others = [each for each in typing.get_args(hint) if each is not type(None)]
         return _bare(others[0]) if len(others) == 1 else hint
     return hint
+
+
+def _told(union: Any, tag: str) -> Any:
+    """The member of a union that a tag stands for: given by a ``pydantic.Tag``, by a literal field, or by its name."""
+    for member in typing.get_args(union):
+        if any(isinstance(each, Tag) and each.tag == tag for each in getattr(member, "__metadata__", ())):
+            return member
+    return next((member for member in _classes(union) if tag in _tags(member)), union)
 
 
 def _tags(kind: Any) -> set[str]:
@@ -636,12 +645,3 @@ def _classes(hint: Any) -> Iterator[Any]:
         yield hint
     for each in typing.get_args(hint):
         yield from _classes(each)
-
-
-# --- until every set of parameters is declared as above
-
-
-def require(name: str, value: object, condition: bool, expected: str) -> None:
-    """Raise ParameterError unless `condition` holds."""
-    if not condition:
-        raise ParameterError(f"parameter '{name}' is {value!r}, expected {expected}")

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from dataclasses import field
+from typing import Annotated, Any, Final
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 
-from gbas_core.parameters import Parameter, ParameterError, parameters
+from gbas_core.parameters import Parameter, parameters
 from gbas_sim.atmosphere.fronts import PlasmaBubble, WedgeFront
 from gbas_sim.atmosphere.ionosphere import IonosphereParams
 from gbas_sim.atmosphere.scintillation import ScintillationParams
@@ -15,27 +16,10 @@ from gbas_sim.atmosphere.troposphere import REFERENCE_HEIGHT, REFRACTIVITY, SCAL
 from gbas_sim.faults.kinds import ReceiverKinds, SatelliteKinds
 from gbas_sim.flight.params import FlightParams
 from gbas_sim.flight.straight_in import StraightInParams
-from gbas_sim.receivers.presets import AirbornePresetParams, GroundPresetParams, IdealPresetParams
+from gbas_sim.receivers.presets import AnyPreset
 from gbas_sim.receivers.receiver import AIRBORNE_RECEIVER, GROUND_RECEIVER, AirborneReceiverParams, ReceiverParams
 from gbas_sim.receivers.site_scene import Building, SceneParams
-
-LONGEST_S = 7.0 * 86_400.0
-
-
-@parameters
-class ConstellationParams:
-    """Where orbits are from; without files they are nominal."""
-
-    almanac: Annotated[str, Parameter("YUMA or SEM file")] = ""
-    navigation: Annotated[
-        tuple[str, ...],
-        Parameter("RINEX navigation files"),
-        BeforeValidator(lambda files: (files,) if isinstance(files, str) else files),
-    ] = ()
-
-    def __post_init__(self) -> None:
-        if self.almanac and self.navigation:
-            raise ParameterError("almanac and navigation are both given; orbits have one source")
+from gbas_sim.world import ConstellationParams, RunParams
 
 
 @parameters
@@ -47,59 +31,43 @@ class TroposphereSection:
     reference_height_m: Annotated[float | None, REFERENCE_HEIGHT] = None
 
 
-_PRESETS = {
-    **dict.fromkeys(("gad_a", "gad_b", "gad_c"), "GroundPresetParams"),
-    **dict.fromkeys(("aad_a", "aad_b"), "AirbornePresetParams"),
-    "ideal": "IdealPresetParams",
-}
+_PRESET: Final = "preset"
+_OWN: Final = "own"
 
 
-def _receiver_kind(section: Any, plain: str) -> str:
-    """Class of a receiver's section; an unknown preset is refused by any class that has one."""
-    if not isinstance(section, Mapping):
-        return type(section).__name__
-    preset = section.get("preset", ...)
-    return plain if preset is ... else _PRESETS.get(str(preset), "GroundPresetParams")
+def _receiver_kind(section: Any) -> str:
+    """Whether a receiver is a preset or has all parameters of its own."""
+    own = isinstance(section, ReceiverParams) or (isinstance(section, Mapping) and _PRESET not in section)
+    return _OWN if own else _PRESET
 
 
-_Presets = (
-    Annotated[GroundPresetParams, Tag("GroundPresetParams")]
-    | Annotated[AirbornePresetParams, Tag("AirbornePresetParams")]
-    | Annotated[IdealPresetParams, Tag("IdealPresetParams")]
-)
 GroundReceiver = Annotated[
-    Annotated[ReceiverParams, Tag("ReceiverParams")] | _Presets,
-    Discriminator(lambda section: _receiver_kind(section, "ReceiverParams")),
+    Annotated[ReceiverParams, Tag(_OWN)] | Annotated[AnyPreset, Tag(_PRESET)], Discriminator(_receiver_kind)
 ]
 AirborneReceiver = Annotated[
-    Annotated[AirborneReceiverParams, Tag("AirborneReceiverParams")] | _Presets,
-    Discriminator(lambda section: _receiver_kind(section, "AirborneReceiverParams")),
+    Annotated[AirborneReceiverParams, Tag(_OWN)] | Annotated[AnyPreset, Tag(_PRESET)], Discriminator(_receiver_kind)
 ]
 Threat = Annotated[
     WedgeFront | PlasmaBubble | WeatherBox | Building | SatelliteKinds | ReceiverKinds, Field(discriminator="kind")
 ]
 
 
+# A section without keys is as if it were left out.
+_LEFT_OUT: Final = BeforeValidator(lambda section: None if section == {} else section)
+
+
 @parameters
-class SimParams:
+class SimParams(RunParams):
     """A simulated world, beside what the station says of its site."""
 
-    systems: Annotated[Literal["G", "E", "GE", "EG"], Parameter("satellite systems")] = "GE"
-    start_week: Annotated[int, Parameter("GPS week of the first epoch", "-", 1024, 8191)] = 2400
-    start_tow_s: Annotated[
-        float, Parameter("time of week of the first epoch; whole milliseconds", "s", 0.0, 604_799.999)
-    ] = 216_000.0
-    interval_s: Annotated[float, Parameter("between epochs; whole milliseconds", "s", 0.01, 60.0)] = 0.5
-    seed: Annotated[int, Parameter("of everything random", "-", 0, 2**63 - 1)] = 1
-    duration_s: Annotated[float | None, Parameter("when not that of the flight", "s", 0.0, LONGEST_S)] = None
     aircraft: Annotated[bool, Parameter("false: a station alone")] = True
     approach: Annotated[str | None, Parameter("approach that is flown, when the station has several")] = None
     constellation: ConstellationParams = ConstellationParams()
     flight: FlightParams = StraightInParams()
     troposphere: TroposphereSection = TroposphereSection()
-    ionosphere: IonosphereParams | None = None
-    scintillation: ScintillationParams | None = None
-    scene: SceneParams | None = None
+    ionosphere: Annotated[IonosphereParams | None, _LEFT_OUT] = None
+    scintillation: Annotated[ScintillationParams | None, _LEFT_OUT] = None
+    scene: Annotated[SceneParams | None, _LEFT_OUT] = None
     ground_receiver: GroundReceiver = GROUND_RECEIVER
     airborne_receiver: AirborneReceiver = AIRBORNE_RECEIVER
-    threats: dict[str, Threat] = Field(default_factory=dict)
+    threats: dict[str, Threat] = field(default_factory=dict)

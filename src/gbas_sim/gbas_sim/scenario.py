@@ -36,6 +36,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -56,7 +57,7 @@ from gbas_sim.receivers.presets import preset_receiver
 from gbas_sim.receivers.receiver import ReceiverParams
 from gbas_sim.receivers.receiver_model import ReceiverModel
 from gbas_sim.receivers.site_scene import Building
-from gbas_sim.world import FlightPath, World, WorldParams
+from gbas_sim.world import FlightPath, RunParams, World, WorldParams
 
 SECTION: Final = "sim"
 
@@ -187,23 +188,17 @@ def _world(ground: dict[str, Any], sim: SimParams) -> WorldParams:
     if not ground:
         raise ParameterError("section 'ground' is missing: there is no site")
     return WorldParams(
+        **{item.name: getattr(sim, item.name) for item in fields(RunParams)},
+        **vars(sim.constellation),
         receiver_ecef_m=_sites(ground),
         station_ecef_m=_station(ground),
         flight=_flight(sim, ground) if sim.aircraft else None,
-        duration_s=sim.duration_s,
         troposphere=_troposphere(ground, sim),
         ionosphere=sim.ionosphere,
         scintillation=sim.scintillation,
         scene=sim.scene,
         ground=_receiver("ground_receiver", sim),
         airborne=_receiver("airborne_receiver", sim),
-        systems=sim.systems,
-        almanac=sim.constellation.almanac,
-        navigation=tuple(each for each in sim.constellation.navigation if each),
-        start_week=sim.start_week,
-        start_tow_s=sim.start_tow_s,
-        interval_s=sim.interval_s,
-        seed=sim.seed,
         **_threats(sim),
     )
 

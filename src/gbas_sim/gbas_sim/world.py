@@ -11,15 +11,17 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any, Final, Protocol
+from typing import Annotated, Any, Final, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pydantic import BeforeValidator, InstanceOf
 
 from gbas_core.gnss.ephemeris import Ephemeris
 from gbas_core.gnss.gpstime import epoch_key, from_epoch_key
 from gbas_core.gnss.observations import ObservationEpoch
 from gbas_core.gnss.orbits import SatelliteState, group_delay_s
+from gbas_core.parameters import Parameter, parameters
 from gbas_core.record import FloatArray, IntArray
 from gbas_core.satellites import N_SATS, SAT_INDEX, satellites_of
 from gbas_core.signal.antenna import airframe_loss_db
@@ -65,6 +67,7 @@ _PASSES_S: Final = 300.0
 """Satellites that set for less may be found with the carrier they had."""
 
 
+@runtime_checkable
 class FlightPath(Protocol):
     """Where an aircraft is: :class:`gbas_sim.flight.straight_in.StraightIn` or
     :class:`gbas_sim.flight.dynamics.Flight`.
@@ -88,8 +91,50 @@ class FlightPath(Protocol):
         ...
 
 
-@dataclass(frozen=True, kw_only=True)
-class WorldParams:
+def _files(value: Any) -> Any:
+    """One file as a list of one; empty names left out."""
+    files = [value] if isinstance(value, str) else value
+    return [each for each in files if each != ""] if isinstance(files, list | tuple) else files
+
+
+@parameters
+class RunParams:
+    """When a run is, of which satellites, and with which random numbers."""
+
+    systems: Annotated[str, Parameter("constellations", choices=("G", "E", "GE", "EG"))] = "GE"
+    start_week: Annotated[int, Parameter("GPS week of the first epoch", "weeks", 1024, 8191)] = 2400
+    start_tow_s: Annotated[
+        float, Parameter("time of week of the first epoch, whole milliseconds", "s", 0.0, 604_799.999)
+    ] = 216_000.0
+    interval_s: Annotated[float, Parameter("between epochs, whole milliseconds", "s", 0.01, 60.0)] = 0.5
+    seed: Annotated[int, Parameter("of everything random", "-", 0, 2**63 - 1)] = 1
+    duration_s: Annotated[
+        float | None, Parameter("of the run; that of the flight unless given", "s", 0.0, LONGEST_S)
+    ] = None
+
+    def __post_init__(self) -> None:
+        for key in ("start_tow_s", "interval_s"):
+            value = getattr(self, key)
+            if abs(value * 1000.0 - round(value * 1000.0)) > 1e-6:
+                raise ValueError(f"{key} = {value!r} is not a whole number of milliseconds")
+
+
+@parameters
+class ConstellationParams:
+    """Where orbits are from; without any file they are nominal."""
+
+    almanac: Annotated[str, Parameter("YUMA or SEM file whose orbits are taken; empty is none")] = ""
+    navigation: Annotated[
+        tuple[str, ...], BeforeValidator(_files), Parameter("RINEX navigation files whose orbits are taken")
+    ] = ()
+
+    def __post_init__(self) -> None:
+        if self.almanac and self.navigation:
+            raise ValueError("almanac and navigation are both given; orbits have one source")
+
+
+@parameters
+class WorldParams(RunParams, ConstellationParams):
     """All a simulated world depends on.
 
     Attributes
@@ -100,8 +145,6 @@ class WorldParams:
         None is a station alone.
     station_ecef_m : (float, float, float), optional
         What distances of the atmosphere are measured from [m]; the first receiver unless given.
-    duration_s : float, optional
-        Of the run [s]: that of the flight unless given.
     troposphere : Troposphere
     weather : tuple of WeatherBox
     ionosphere : IonosphereParams, optional
@@ -115,64 +158,34 @@ class WorldParams:
     buildings : tuple of Building
         Around them; on ground that reflects nothing, unless there is a scene.
     ground, airborne : ReceiverParams or ReceiverModel
-    systems : str
-        ``"G"``, ``"E"`` or ``"GE"``.
-    almanac : str
-        YUMA or SEM file whose orbits are taken; empty is none.
-    navigation : tuple of str
-        RINEX navigation files whose orbits are taken; without these and an almanac, orbits are nominal.
-    start_week, start_tow_s
-        First epoch; whole milliseconds.
-    interval_s : float
-        Between epochs; whole milliseconds.
-    seed : int
-        Of everything random.
     """
 
     receiver_ecef_m: tuple[tuple[float, float, float], ...]
-    flight: FlightPath | None
+    flight: InstanceOf[FlightPath] | None
     station_ecef_m: tuple[float, float, float] | None = None
-    duration_s: float | None = None
     troposphere: Troposphere = Troposphere()
     weather: tuple[WeatherBox, ...] = ()
     ionosphere: IonosphereParams | None = None
     fronts: tuple[WedgeFront | PlasmaBubble, ...] = ()
     scintillation: ScintillationParams | None = None
-    faults: tuple[SatelliteFault | ReceiverFault, ...] = ()
+    faults: tuple[InstanceOf[SatelliteFault] | InstanceOf[ReceiverFault], ...] = ()
     scene: SceneParams | None = None
     buildings: tuple[Building, ...] = ()
-    ground: ReceiverParams | ReceiverModel = GROUND_RECEIVER
-    airborne: ReceiverParams | ReceiverModel = AIRBORNE_RECEIVER
-    systems: str = "GE"
-    almanac: str = ""
-    navigation: tuple[str, ...] = ()
-    start_week: int = 2400
-    start_tow_s: float = 216_000.0
-    interval_s: float = 0.5
-    seed: int = 1
+    ground: InstanceOf[ReceiverParams] | InstanceOf[ReceiverModel] = GROUND_RECEIVER
+    airborne: InstanceOf[ReceiverParams] | InstanceOf[ReceiverModel] = AIRBORNE_RECEIVER
 
     def __post_init__(self) -> None:
-        _within("seed", self.seed, 0, 2**63 - 1)
-        _within("start_week", self.start_week, 1024, 8191)
-        _within("start_tow_s", self.start_tow_s, 0.0, 604_799.999)
-        _within("interval_s", self.interval_s, 0.01, 60.0)
-        _whole_milliseconds("start_tow_s", self.start_tow_s)
-        _whole_milliseconds("interval_s", self.interval_s)
-        if self.systems not in ("G", "E", "GE", "EG"):
-            raise ValueError(f"world: systems = {self.systems!r} is not G, E or GE")
-        if self.almanac and self.navigation:
-            raise ValueError("world: almanac and navigation are both given; orbits have one source")
+        RunParams.__post_init__(self)
+        ConstellationParams.__post_init__(self)
         self._check_duration()
         self._check_sites()
 
     def _check_duration(self) -> None:
         if self.flight is None and self.duration_s is None:
             raise ValueError("world: duration_s is missing, and there is no flight to take it from")
-        if self.duration_s is not None:
-            _within("duration_s", self.duration_s, 0.0, LONGEST_S)
-            if self.flight is not None and self.duration_s > self.flight.duration_s:
-                longest = self.flight.duration_s
-                raise ValueError(f"world: duration_s = {self.duration_s:g} is longer than the flight, {longest:g}")
+        if self.duration_s is not None and self.flight is not None and self.duration_s > self.flight.duration_s:
+            longest = self.flight.duration_s
+            raise ValueError(f"world: duration_s = {self.duration_s:g} is longer than the flight, {longest:g}")
 
     def _check_sites(self) -> None:
         if not 1 <= len(self.receiver_ecef_m) <= MAX_RECEIVERS:
@@ -211,16 +224,6 @@ class WorldParams:
     def n_epochs(self) -> int:
         """Epochs of the run; a flight's last is at or before its end."""
         return int(self.length_s / self.interval_s) + 1
-
-
-def _within(key: str, value: float, low: float, high: float) -> None:
-    if not low <= value <= high:
-        raise ValueError(f"world: {key} = {value!r} is not within {low:g} to {high:g}")
-
-
-def _whole_milliseconds(key: str, value: float) -> None:
-    if abs(value * 1000.0 - round(value * 1000.0)) > 1e-6:
-        raise ValueError(f"world: {key} = {value!r} is not a whole number of milliseconds")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

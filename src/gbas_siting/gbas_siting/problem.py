@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
 from functools import cached_property
-from typing import Final, Literal
+from typing import Annotated, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gbas_core.parameters import ParameterError, require
+from gbas_core.parameters import Parameter, ParameterError, parameters
 from gbas_core.record import FloatArray
 from gbas_core.signals import BANDS, IONO_RATIO, L1, N_BANDS, WAVELENGTH_M
 from gbas_ground.monitors.gradient_detectability import (
@@ -30,33 +29,15 @@ MAX_RECEIVERS: Final = 12
 """Bound against searches without end; a station has four."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@parameters
 class SitingProblem:
     """Receivers to be placed along a runway.
 
-    Attributes
-    ----------
-    n_receivers : int
-        Receivers in all, those that exist included; 2 to :data:`MAX_RECEIVERS`.
-    existing_m : tuple of (float, float)
-        East and north of receivers that stay where they are [m]; the first is the reference receiver of a star. None:
-        the first receiver is put at the origin.
-    runway_bearing_rad : float
-        True bearing; new receivers are put on the line through the first receiver in this direction [rad].
-    gradient_range : pair of float
-        Gradients to be detected, along the runway [m/m].
-    k : float
-        Standard deviations between a multiple of the wavelength and a detectable gradient.
-    baselines : {"star", "all"}
-        Which baselines are monitored: those of the first receiver, or every pair.
-    tolerance_m : float
-        A new receiver may come to stand this far, along the runway, from its planned distance to the first one; the
-        result holds for the worst case [m].
-    max_length_m : float, optional
-        Farthest a new receiver may be from the first, along the runway [m]. Default: :data:`MAX_LENGTH_M`, or the
-        longest existing baseline where that is longer.
-    bands : tuple of int
-        Bands that are monitored; a gradient need be detected on one of them.
+    New receivers are put on the line through the first receiver along the runway. With a star, baselines of the first
+    receiver are monitored; otherwise every pair. A new receiver may come to stand the tolerance from its planned
+    distance to the first one: the result holds for the worst case. Without a greatest length it is
+    :data:`MAX_LENGTH_M`, or the longest existing baseline where that is longer. A gradient need be detected on one of
+    the bands.
 
     Raises
     ------
@@ -64,32 +45,37 @@ class SitingProblem:
         For anything out of bounds.
     """
 
-    n_receivers: int
-    existing_m: tuple[tuple[float, float], ...] = ()
-    runway_bearing_rad: float = 0.5 * math.pi
-    gradient_range: tuple[float, float] = GRADIENT_RANGE
-    k: float = k_factor()
-    baselines: Baselines = "star"
-    tolerance_m: float = 0.0
-    max_length_m: float | None = None
-    bands: tuple[int, ...] = (L1,)
+    n_receivers: Annotated[int, Parameter("receivers in all, those that exist included", "-", 2, MAX_RECEIVERS)]
+    existing_m: Annotated[
+        tuple[tuple[float, float], ...],
+        Parameter("east and north of receivers that stay; none: the first is put at the origin", "m"),
+    ] = ()
+    runway_bearing_rad: Annotated[float, Parameter("true bearing of the runway", "deg")] = 0.5 * math.pi
+    gradient_range: Annotated[tuple[float, float], Parameter("gradients to be detected, along the runway", "m/m")] = (
+        GRADIENT_RANGE
+    )
+    k: Annotated[
+        float, Parameter("standard deviations between a multiple of the wavelength and a detectable gradient")
+    ] = k_factor()
+    baselines: Annotated[Baselines, Parameter("which baselines are monitored")] = "star"
+    tolerance_m: Annotated[float, Parameter("placement tolerance along the runway", "m", 0.0)] = 0.0
+    max_length_m: Annotated[
+        float | None, Parameter("farthest a new receiver may be from the first, along the runway", "m", 0.0, 1.0e5)
+    ] = None
+    bands: Annotated[tuple[int, ...], Parameter("numbers of the bands that are monitored", "-", 0, N_BANDS - 1)] = (L1,)
 
     def __post_init__(self) -> None:
-        require("receivers", self.n_receivers, 2 <= self.n_receivers <= MAX_RECEIVERS, f"2 to {MAX_RECEIVERS}")
         if len(self.existing_m) > self.n_receivers:
             raise ParameterError(
                 f"receivers is {self.n_receivers}: must be at least the number of existing ones, {len(self.existing_m)}"
             )
-        for position in self.existing_m:
-            require("existing", position, all(math.isfinite(each) for each in position), "finite metres")
-        require("runway_bearing_rad", self.runway_bearing_rad, math.isfinite(self.runway_bearing_rad), "a finite angle")
         check_gradient_range(self.gradient_range)
-        require("k", self.k, math.isfinite(self.k) and self.k > 0.0, "a finite number above 0")
-        require("baselines", self.baselines, self.baselines in ("star", "all"), "star or all")
-        require("tolerance_m", self.tolerance_m, 0.0 <= self.tolerance_m < math.inf, "at least 0 m and finite")
-        require("max_length_m", self.length_limit_m, 0.0 < self.length_limit_m <= 1.0e5, "above 0, at most 100 km")
-        known = all(0 <= band < N_BANDS for band in self.bands) and len(set(self.bands)) == len(self.bands) > 0
-        require("bands", self.bands, known, f"one or more of {', '.join(BANDS)}, each once")
+        if not self.k > 0.0:
+            raise ParameterError(f"k = {self.k!r} is not above 0")
+        if not 0.0 < self.length_limit_m <= 1.0e5:
+            raise ParameterError(f"max_length_m = {self.length_limit_m!r} is not above 0 and at most 100 km")
+        if not len(set(self.bands)) == len(self.bands) > 0:
+            raise ParameterError(f"bands = {self.bands!r} is not one or more of {', '.join(BANDS)}, each once")
 
     @property
     def n_new(self) -> int:

@@ -368,7 +368,7 @@ def test_threat_space_by_elevation():
         ({"threat_space": "germany"}, "gradient = 0.0004 is not within 0 to 0.00014 of germany"),
         ({"threat_space": "gast_d", "speed_mps": 800.0}, "gradient = 0.0004 is not within 0 to 0.0001 of gast_d"),
         ({"threat_space": "brazil", "speed_mps": 10.0}, "speed_mps = 10 is not within 40 to 250 of brazil"),
-        ({"threat_space": "mars"}, "threat_space = 'mars' is not one of , conus, "),
+        ({"threat_space": "mars"}, "threat_space = 'mars' is not one of conus, "),
         ({"width_m": -1.0}, "width_m = -1 is not within 1 to 10000000 m"),
         ({"max_delay_m": 30.0}, "max_delay_m = 30.0 is not gradient times width_m = 40"),
         ({"width_m": None}, "width_m and max_delay_m are both missing"),

@@ -76,7 +76,7 @@ def test_peak_is_the_filtered_triangle():
     ("make", "message"),
     [
         (lambda: Deformation(lag_chips=0.7), "lag_chips = 0.7 is not within -0.5 to 0.5 chips"),
-        (lambda: Deformation(damping_neperps=0.0), "damping_neperps = 0 is not within 100000 to 1e+08 neper/s"),
+        (lambda: Deformation(damping_neperps=0.0), "damping_neperps = 0 is not within 100000 to 100000000 neper/s"),
         (lambda: deformation_bias_m(Deformation(lag_chips=0.1), Correlator(0.1, WIDE), 1), "no model for E1"),
     ],
 )

@@ -305,7 +305,7 @@ def test_none_is_nothing():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: divergence("Code L2"), "mode = 'Code L2' is not one of Code L1, Code L5, Carrier L1"),
+        (lambda: divergence("Code L2"), "mode = 'Code L2' is not one of Code L1; Code L5; Carrier L1; "),
         (
             lambda: divergence("Code L1", satellite="R01"),
             "satellite = 'R01' is not one of G01, G02, ..., E36",

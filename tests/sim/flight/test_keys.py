@@ -142,7 +142,7 @@ def segment(**keys):
         (changed(turning_earth="no"), "turning_earth = 'no' is not true or false"),
         (
             changed(profile="five_phase"),
-            "flight.speed_mps is unknown; known are aircraft, mass_kg, planned_wind, profile",
+            "flight: speed_mps is given, but profile says what is flown",
         ),
         ({"profile": "six_phase"}, "flight.profile = 'six_phase' is not one of 'five_phase'"),
         (changed(start={"latitude_deg": 1.0}), "flight.start.longitude_deg is missing"),

@@ -138,6 +138,7 @@ def test_scene_and_buildings_from_keys():
     assert building.heading_rad == pytest.approx(math.radians(30.0))
     assert world.scene.antenna == "mla"
     assert scenario().scene is None
+    assert scenario(scene={}).scene is None  # a section without keys is as if it were left out
     assert len(World(world)) == 11
 
 
@@ -153,7 +154,7 @@ def test_preset_with_loops_and_clock_of_ones_own():
 @pytest.mark.parametrize(
     ("sim", "message"),
     [
-        ({"scene": {"ground": "marble"}}, "sim.scene.ground = 'marble' is not one of , metal, concrete"),
+        ({"scene": {"ground": "marble"}}, "sim.scene.ground = 'marble' is not one of metal, concrete"),
         ({"scene": {"grass": 1}}, "sim.scene.grass is unknown; known are antenna, antenna_height_m, ground"),
         ({"scene": {"antenna_height_m": 0.0}}, "sim.scene.antenna_height_m = 0 is not within 0.1 to 100 m"),
         (

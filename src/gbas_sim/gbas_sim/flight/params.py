@@ -23,7 +23,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import Discriminator, Tag
+from pydantic import Discriminator, Tag, model_validator
 
 from gbas_core.parameters import Numbered, Parameter, parameters
 from gbas_core.positioning.approach import FinalApproach
@@ -65,6 +65,14 @@ class FivePhaseFlightParams(DynamicFlightParams):
 
     profile: Annotated[Literal["five_phase"], Parameter("flight that is known by name")]
     aircraft: Annotated[str, _AIRCRAFT] = "fighter"
+
+    @model_validator(mode="before")
+    @classmethod
+    def _all_is_in_the_profile(cls, section: Any) -> Any:
+        for key in ("speed_mps", "configuration", "segments") if isinstance(section, Mapping) else ():
+            if key in section:
+                raise ValueError(f"{key} is given, but profile says what is flown")
+        return section
 
 
 def _kind(section: Any) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Annotated, Any
 
 from gbas_core.gnss.ephemeris import Ephemeris
@@ -14,6 +15,7 @@ from gbas_msgs_py.tables import TruthEpoch
 from gbas_node.driver import DriverNode
 from gbas_node.node import run
 from gbas_node.params import DriverParams
+from gbas_sim.params import TroposphereSection
 from gbas_sim.scenario import SECTION, open_world, read_sections, scenario_from_mapping, sim_params
 from gbas_sim.world import SimulatedEpoch, Truth, World
 
@@ -40,7 +42,9 @@ class Simulator(DriverNode[SimulatedEpoch]):
         self._world: World | None = None
         super().__init__("simulator", **kwargs)
         sections, source = self._sections()
-        self.show_parameters(sim_params(sections, source=source), f"{SECTION}.")
+        sim, world = sim_params(sections, source=source), self.world.params
+        in_use = replace(sim, duration_s=world.length_s, troposphere=TroposphereSection(**vars(world.troposphere)))
+        self.show_parameters(in_use, f"{SECTION}.")
         self.ephemerides: ReceptionQueue[Ephemeris] = ReceptionQueue()
         for each in self.world.ephemerides:
             self.ephemerides.add(epoch_key(each.gps_week, each.tow_s), each)

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
-from gbas_core.parameters import require
+from gbas_core.parameters import ParameterError
 from gbas_core.record import FloatArray
 from gbas_ground.monitors.gradient_detectability import (
     GRADIENT_RANGE,
@@ -46,6 +46,11 @@ _FARTHEST: Final = 5.0
 """Standard deviations by which a count of a Monte Carlo run may be off."""
 
 
+def _require(name: str, value: object, condition: bool, expected: str) -> None:
+    if not condition:
+        raise ParameterError(f"{name} = {value!r} is not {expected}")
+
+
 @dataclass(frozen=True, kw_only=True)
 class Star:
     """Baselines from one receiver with equal noise, and their threshold.
@@ -71,10 +76,10 @@ class Star:
 
     def __post_init__(self) -> None:
         lengths = self.lengths_m
-        require("baselines", lengths, bool(lengths) and all(0.0 < each <= 1e5 for each in lengths), "0 to 100 km each")
+        _require("baselines", lengths, bool(lengths) and all(0.0 < each <= 1e5 for each in lengths), "0 to 100 km each")
         # Above, the multiples that are left out of the sums count.
-        require("sigma_m", self.sigma_m, 0.0 < self.sigma_m <= MAX_SIGMA_M, f"above 0, at most {MAX_SIGMA_M} m")
-        require("p_false_alarm", self.p_false_alarm, 0.0 < self.p_false_alarm < 1.0, "between 0 and 1")
+        _require("sigma_m", self.sigma_m, 0.0 < self.sigma_m <= MAX_SIGMA_M, f"above 0, at most {MAX_SIGMA_M} m")
+        _require("p_false_alarm", self.p_false_alarm, 0.0 < self.p_false_alarm < 1.0, "between 0 and 1")
 
     @property
     def threshold_m(self) -> float:
