@@ -25,7 +25,6 @@ from gbas_core.errors import GbasError
 from gbas_core.gnss.gpstime import epoch_key
 from gbas_core.gnss.observations import ObservationEpoch
 from gbas_core.satellites import IS_GPS
-from gbas_ground import station
 from gbas_msgs_py import ros, tables, topics
 from gbas_msgs_py.records import ProtectionEpoch
 from gbas_vdb.transmission.burst import Burst
@@ -143,4 +142,4 @@ def test_every_part_gives_figures(tmp_path, monkeypatch, data_dir):
 
 
 def test_the_monitors_are_timed_by_names_the_station_has():
-    assert all(callable(getattr(station, name)) for name in monitors._MEASURED)
+    assert all(callable(getattr(module, name)) for module, name in monitors._MEASURED)

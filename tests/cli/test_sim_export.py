@@ -51,7 +51,7 @@ def test_exported_files_go_through_gbas_process(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("more", "message"),
     [
-        (", threats: {a: {kind: frozen, receiver: rr1}}", "short.yaml: sim.threats.a: start_s is missing"),
+        (", threats: {a: {kind: frozen, receiver: rr1}}", "short.yaml: sim.threats.a.start_s is missing"),
         (
             ", threats: {a: {kind: clock, satellite: G30, step_s: 1.0e-6, start_s: 0.0}}",
             "short.yaml: fault clock: satellite = 'G30' is not up between 0 and 60 s",
