@@ -18,7 +18,9 @@ from mcap.records import Message as McapMessage
 from mcap.stream_reader import StreamReader, breakup_chunk
 from rosbags.highlevel import AnyReader
 
-from gbas_bags.bags import BagReader, info, recover
+from gbas_bags.bags import BagReader
+from gbas_bags.info import info
+from gbas_bags.recovery import recover
 from gbas_core.errors import BagError
 
 CHUNK_BYTES = 20_000

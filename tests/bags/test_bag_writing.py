@@ -11,8 +11,9 @@ import yaml
 from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 
-from gbas_bags.bags import BagReader, info
+from gbas_bags.bags import BagReader
 from gbas_bags.definitions import definition, qos_record
+from gbas_bags.info import info
 from gbas_bags.mcap_log import BagWriter, McapLog, Topic
 from gbas_core.errors import BagError
 

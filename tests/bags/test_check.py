@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gbas_bags.check import CheckResult, check
+from gbas_bags.check import check
+from gbas_bags.problems import CheckResult
 from gbas_core.gnss.gpstime import from_epoch_key
 from gbas_msgs_py import topics
 from gbas_msgs_py.codes import EventKind

@@ -14,6 +14,7 @@ from gbas_bags import bags
 from gbas_bags.bags import vector_instructions
 from gbas_bags.check import check
 from gbas_bags.compare import NAMES, TopicComparison
+from gbas_bags.info import info
 from gbas_bags.records import read_records
 from gbas_cli.replay import ReplayRequest, ReplayResult, replay
 from gbas_core.record import columns_of
@@ -28,7 +29,7 @@ def test_the_bag_is_small_whole_and_labelled() -> None:
     assert sum(file.stat().st_size for file in BAG.iterdir()) < 3_000_000
     result = check(BAG)
     assert result.ok, result.problems
-    document = bags.info(BAG).as_json()
+    document = info(BAG).as_json()
     assert document["origin"] == "simulated"
     assert document["command"].startswith("gbas demo --config short_approach")
 
@@ -37,7 +38,7 @@ def test_the_bag_is_small_whole_and_labelled() -> None:
 def test_replay_gives_the_recorded_numbers(tmp_path: Path) -> None:
     result = replay(ReplayRequest(bag=BAG, out=tmp_path, quiet=True))
     assert {topic.name for topic in result.topics} == set(NAMES.values())
-    recorded_on = bags.info(BAG).metadata[bags.SUITE_METADATA].get(bags.VECTOR_METADATA)
+    recorded_on = info(BAG).metadata[bags.SUITE_METADATA].get(bags.VECTOR_METADATA)
     if recorded_on in (None, vector_instructions()):
         assert [difference(topic) for topic in result.topics if differs(topic)] == []
     else:

@@ -23,8 +23,10 @@ from rclpy.node import Node
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import Float64, Float64MultiArray, String
 
-from gbas_bags.bags import BagReader, info, recover
+from gbas_bags.bags import BagReader
 from gbas_bags.check import check
+from gbas_bags.info import info
+from gbas_bags.recovery import recover
 from gbas_bringup.environment import process_environment
 from gbas_core.gnss.gpstime import epoch_key, from_epoch_key
 from gbas_core.gnss.observations import ObservationEpoch

@@ -11,8 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from gbas_bags.bags import info, recover
 from gbas_bags.check import check
+from gbas_bags.info import info
+from gbas_bags.recovery import recover
 
 pytestmark = pytest.mark.ros
 

@@ -145,7 +145,7 @@ def test_interrupt_has_exit_code_130(monkeypatch: pytest.MonkeyPatch, tmp_path: 
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("gbas_bags.bags.info", interrupt)
+    monkeypatch.setattr("gbas_bags.info.info", interrupt)
     fails("bag", "info", tmp_path, code=130)
 
 

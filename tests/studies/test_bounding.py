@@ -13,12 +13,14 @@ from gbas_msgs_py.records import SolutionEpoch
 from gbas_studies.bounding import (
     BoundingReport,
     ErrorSeries,
-    StanfordCounts,
     bounding_report,
-    correlation_time_s,
     error_series,
-    interval,
     measured_sigma,
+)
+from gbas_studies.exceedances import (
+    StanfordCounts,
+    correlation_time_s,
+    interval,
     stanford_counts,
 )
 

@@ -13,7 +13,8 @@ from gbas_core.gnss.ephemeris import Ephemeris
 from gbas_core.gnss.observations import ObservationEpoch
 from gbas_core.satellites import N_SATS, missing
 from gbas_core.signal.antenna import ANTENNAS
-from gbas_core.signal.rays import Scene, box, ray_errors
+from gbas_core.signal.rays import Scene, ray_errors
+from gbas_core.signal.surfaces import box
 from gbas_core.signals import N_BANDS
 from gbas_msgs_py import tables
 from gbas_vdb.messages.ephemeris_crc import GPS_FIELDS, ephemeris_crcs

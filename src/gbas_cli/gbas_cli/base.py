@@ -21,6 +21,8 @@ OUT = Path("out")
 _JSON_KEY = "gbas.json"
 _NUMBER = re.compile(r"^-\.?\d")
 _OWN_PACKAGES = ("gbas_",)
+_WIDE = 200
+"""Columns of a table that goes into a file or a pipe."""
 
 
 class ListsCommand(TyperCommand):
@@ -112,6 +114,7 @@ def remember_json(ctx: typer.Context, value: bool) -> bool:
     return value
 
 
+BagPath = Annotated[Path, typer.Argument(metavar="BAG", help="Folder of a bag, or a .mcap file.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON only.", callback=remember_json)]
 
 
@@ -177,3 +180,16 @@ def position_of(text: str) -> tuple[float, float, float]:
     except ValueError:
         raise typer.BadParameter(f"{text!r} is not X,Y,Z in metres (no blanks)") from None
     return x, y, z
+
+
+def print_table(title: str, headings: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:
+    """Rows in columns, as wide as the terminal."""
+    from rich.console import Console
+    from rich.table import Table
+
+    if title:
+        print(f"{title}:")
+    table = Table(*headings, box=None, pad_edge=False)
+    for row in rows:
+        table.add_row(*row)
+    Console(width=None if sys.stdout.isatty() else _WIDE).print(table)

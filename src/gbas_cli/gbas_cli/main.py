@@ -9,19 +9,21 @@ from __future__ import annotations
 import itertools
 import re
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from gbas_bringup import __version__
+from gbas_cli import bag as cli_bag
 from gbas_cli import config as cli_config
 from gbas_cli import reproduce as cli_reproduce
+from gbas_cli import sim as cli_sim
 from gbas_cli import siting as cli_siting
 from gbas_cli import study as cli_study
-from gbas_cli import vdb_fas as cli_vdb_fas
+from gbas_cli import vdb as cli_vdb
 from gbas_cli.base import (
+    BagPath,
     GbasGroup,
     Json,
     ListsCommand,
@@ -30,12 +32,10 @@ from gbas_cli.base import (
     position_of,
     print_json,
     print_places,
+    print_table,
     speed_option,
 )
-from gbas_core.errors import EXIT_BAD_INPUT, EXIT_INTERNAL, ConfigError
-
-_WIDE = 200
-"""Columns of a table that goes into a file or a pipe."""
+from gbas_core.errors import EXIT_INTERNAL, ConfigError
 
 app = typer.Typer(
     name="gbas",
@@ -46,23 +46,18 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-bag_app = typer.Typer(help="Look into recorded bags, check them, save damaged ones.", no_args_is_help=True)
-vdb_app = typer.Typer(help="Messages of the VHF data broadcast: bits to values and back.", no_args_is_help=True)
-sim_app = typer.Typer(help="Simulated worlds as files.", no_args_is_help=True)
-app.add_typer(bag_app, name="bag")
+app.add_typer(cli_bag.app, name="bag")
 app.add_typer(cli_config.app, name="config")
-app.add_typer(sim_app, name="sim")
-app.add_typer(vdb_app, name="vdb")
+app.add_typer(cli_sim.app, name="sim")
+app.add_typer(cli_vdb.app, name="vdb")
 cli_reproduce.register(app)
 cli_siting.register(app)
 cli_study.register(app)
-cli_vdb_fas.register(vdb_app)
 
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Show every line the nodes write.")]
 Speed = Annotated[str, typer.Option("--speed", help="'max', or a multiple of real time.", metavar="max|N")]
 SingleProcess = Annotated[bool, typer.Option("--single-process", help="All nodes in one process.")]
 Domain = Annotated[int | None, typer.Option("--domain", help="ROS domain, 0 to 232.", metavar="N")]
-BagPath = Annotated[Path, typer.Argument(metavar="BAG", help="Folder of a bag, or a .mcap file.")]
 
 
 def _version(value: bool) -> None:
@@ -153,9 +148,9 @@ def run(
         if as_json:
             print_json({"bag": None})
         return
-    from gbas_bags import bags
+    from gbas_bags.info import info
 
-    document = bags.info(plan.bag_path).as_json()
+    document = info(plan.bag_path).as_json()
     if as_json:
         print_json(document)
         return
@@ -195,9 +190,9 @@ def launch_list(as_json: Json = False) -> None:
     if as_json:
         print_json({"configurations": configs, "launch_files": launches, "nodes": nodes})
         return
-    _print_table("configurations, for gbas run", ("name", "what it is"), list(configs.items()))
-    _print_table("launch files, for ros2 launch gbas_bringup", ("name",), [(name,) for name in launches])
-    _print_table("nodes", ("name", "python -m"), list(nodes.items()))
+    print_table("configurations, for gbas run", ("name", "what it is"), list(configs.items()))
+    print_table("launch files, for ros2 launch gbas_bringup", ("name",), [(name,) for name in launches])
+    print_table("nodes", ("name", "python -m"), list(nodes.items()))
 
 
 def _can_run(path: Path) -> bool:
@@ -359,169 +354,6 @@ def bench(
     print_places({"report": folder / "bench.json"})
 
 
-# --- simulated worlds
-
-
-@sim_app.command("export")
-def sim_export(
-    scenario: Annotated[str, typer.Argument(metavar="SCENARIO", help="A .yaml file, or a name from launch-list.")],
-    rinex: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder for RINEX 3 files of every receiver and the truth.")
-    ] = None,
-    bag: Annotated[bool, typer.Option("--bag", help="Run the scenario, too, and record a bag.")] = False,
-    out: Annotated[Path | None, typer.Option(help="Folder for the bag (default: out/SCENARIO-N).")] = None,
-    as_json: Json = False,
-) -> None:
-    """Write a scenario as observation, navigation and truth files that other software reads."""
-    from gbas_bringup.progress import progress
-    from gbas_bringup.resources import named_config
-    from gbas_cli import sim_export as body
-
-    if rinex is None and not bag:
-        raise typer.BadParameter("nothing to write: give --rinex DIR, --bag, or both")
-    path = named_config(scenario)
-    places: dict[str, Path] = {}
-    if rinex is not None:
-        with progress("exporting", enabled=not as_json) as update:
-            files = body.export_rinex(path, rinex, progress=lambda done, total: update(done, total, ""))
-        places = {each.stem: each for each in files.observations} | {"navigation": files.navigation}
-        places |= {} if files.truth is None else {"truth": files.truth}
-    if bag:
-        folder = new_out(out, path.stem)
-        places["bag"] = body.export_bag(path, folder, quiet=as_json, command=command_line())
-    if as_json:
-        print_json({"simulated": True, "files": {name: str(place) for name, place in places.items()}})
-    else:
-        print_places(places)
-
-
-# --- bags
-
-
-@bag_app.command()
-def info(bag: BagPath, as_json: Json = False) -> None:
-    """Topics, counts, duration, epochs, whether simulated, and which version wrote it."""
-    from gbas_bags import bags
-    from gbas_bags.versions import older_text
-
-    document = bags.info(bag).as_json()
-    if as_json:
-        print_json(document)
-        return
-    epochs = document["epochs"]
-    lines = {
-        "bag": document["bag"],
-        "size": f"{document['size_bytes'] / 1e6:.2f} MB in {len(document['files'])} file(s)",
-        "data": document["origin"],
-        "suite version": document["suite_version"] or "not known",
-        "command": document["command"] or "not known",
-        "created": document["created"] or "not known",
-        "configuration": ", ".join(document["configuration"]) or "none stored",
-        "duration": f"{document['duration_s']:.3f} s, from {document['start']} (GPS time)",
-        "epochs": "none" if epochs is None else _epochs_text(epochs),
-        "messages": str(document["messages"]),
-        "tables": older_text(document["older_tables"]) if document["older_tables"] else "of this version",
-        "lost in transport": "not known" if document["lost_in_transport"] is None else document["lost_in_transport"],
-    }
-    for name, value in lines.items():
-        print(f"{name:18} {value}")
-    rows = [(topic["topic"], topic["type"], str(topic["messages"])) for topic in document["topics"]]
-    _print_table("", ("topic", "type", "messages"), rows)
-    for damage in document["damages"]:
-        print(f"gbas: {damage['file']}: at byte {damage['offset']}: {damage['what']}", file=sys.stderr)
-    if document["damages"]:
-        print(f"gbas: what is readable is counted above; save it with: gbas bag recover {bag}", file=sys.stderr)
-
-
-def _epochs_text(epochs: dict[str, Any]) -> str:
-    first, last = epochs["first"], epochs["last"]
-    span = f"week {first['gps_week']} {first['tow_s']:.3f} s to week {last['gps_week']} {last['tow_s']:.3f} s"
-    return f"{epochs['count']}, {span}, every {epochs['interval_s']} s"
-
-
-@bag_app.command()
-def check(bag: BagPath, as_json: Json = False) -> None:
-    """Is it whole, readable by other tools, in order, and can its alerts be traced? Exit code 2 if not."""
-    from gbas_bags import check as bag_check
-
-    result = bag_check.check(bag)
-    if as_json:
-        print_json(result.as_json())
-    else:
-        for line in bag_check.problems_of(result):
-            print(line)
-        for note in result.notes:
-            print(f"note: {note}")
-        done = ", ".join(f"{count} {what}" for what, count in result.checked.items())
-        verdict = "good" if result.ok else f"{len(result.problems) + result.unlisted} problems"
-        print(f"{bag}: {verdict} ({result.messages} messages; {done})")
-    if not result.ok:
-        raise typer.Exit(EXIT_BAD_INPUT)
-
-
-@bag_app.command()
-def recover(
-    bag: BagPath,
-    out: Annotated[Path | None, typer.Option(help="Folder of the new bag (default: BAG_recovered).")] = None,
-    as_json: Json = False,
-) -> None:
-    """Make a good bag of what is whole in a damaged or unclosed one; the original is not touched."""
-    from gbas_bags import bags
-
-    result = bags.recover(bag, out)
-    document = result.as_json()
-    if as_json:
-        print_json(document)
-        return
-    for damage in document["damages"]:
-        print(f"{damage['file']}: at byte {damage['offset']}: {damage['what']}")
-    unknown = document["parts_of_unknown_content"]
-    more = f", and what was in {unknown} damaged part(s), which nobody can tell" if unknown else ""
-    print(f"kept {document['kept']} messages of {len(document['kept_by_topic'])} topics")
-    print(f"lost {document['lost']} messages{more}")
-    for topic, count in document["lost_by_topic"].items():
-        print(f"  {count} of {topic}")
-    print_places({"bag": result.target})
-
-
-# --- VDB
-
-
-@vdb_app.command()
-def decode(
-    hex_text: Annotated[str, typer.Option("--hex", metavar="AA...", help="Hexadecimal digits; '-' reads them.")],
-    burst: Annotated[bool, typer.Option("--burst", help="Application data with FEC, or all scrambled bits.")] = False,
-    as_json: Json = False,
-) -> None:
-    """Message blocks or a burst, as physical values. A bad CRC is an error."""
-    from gbas_vdb.messages.describe import decode_hex_to_json
-
-    print_json(decode_hex_to_json(sys.stdin.read() if hex_text == "-" else hex_text, burst))
-
-
-@vdb_app.command()
-def encode(
-    document: Annotated[Path, typer.Argument(metavar="DOCUMENT", help="JSON as decode prints it; '-' reads it.")],
-    burst: Annotated[bool, typer.Option("--burst", help="With the application FEC.")] = False,
-    as_json: Json = False,
-) -> None:
-    """Hexadecimal digits of the message blocks in a JSON document."""
-    import json
-
-    from gbas_vdb.messages.describe import encode_json_to_hex
-
-    text = sys.stdin.read() if str(document) == "-" else document.read_text(encoding="utf-8")
-    try:
-        content = json.loads(text)
-    except ValueError as error:
-        raise ConfigError(document, f"is not JSON: {error}") from error
-    digits = encode_json_to_hex(content, burst)
-    if as_json:
-        print_json({"hex": digits})
-    else:
-        print(digits)
-
-
 # --- for people
 
 
@@ -529,18 +361,6 @@ def _print_summary(summary: dict[str, Any]) -> None:
     from gbas_chain.results import summary_lines
 
     print("\n".join(summary_lines(summary)))
-
-
-def _print_table(title: str, headings: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:
-    from rich.console import Console
-    from rich.table import Table
-
-    if title:
-        print(f"{title}:")
-    table = Table(*headings, box=None, pad_edge=False)
-    for row in rows:
-        table.add_row(*row)
-    Console(width=None if sys.stdout.isatty() else _WIDE).print(table)
 
 
 def main() -> None:

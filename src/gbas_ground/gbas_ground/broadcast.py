@@ -29,12 +29,8 @@ from gbas_msgs_py.records import MAX_REFERENCE_RECEIVERS, IntegrityEpoch
 from gbas_vdb.messages.tables import CORRECTION_ENTRIES
 from gbas_vdb.messages.types import Correction30, Correction100
 from gbas_vdb.transmission.burst import FRAME_DURATION_S, Burst
-from gbas_vdb.transmission.schedule import (
-    Frame,
-    ScheduleState,
-    SourceCorrection,
-    schedule_frame,
-)
+from gbas_vdb.transmission.frame import Frame, ScheduleState, SourceCorrection
+from gbas_vdb.transmission.schedule import schedule_frame
 
 _FRAME_MS: Final = round(1000 * FRAME_DURATION_S)
 _IOD_MODULUS: Final = 256

@@ -57,7 +57,7 @@ from gbas_vdb.messages.block import encode_body
 from gbas_vdb.messages.path_point import trusted_path_point
 from gbas_vdb.messages.types import AdditionalBlock1, AdditionalBlock3, AdditionalBlock4, FasDataSet, Type2, Type4
 from gbas_vdb.transmission.burst import SLOT_NAMES
-from gbas_vdb.transmission.schedule import ScheduleParams
+from gbas_vdb.transmission.frame import ScheduleParams
 
 SECTION: Final = "ground"
 RENAMED: Final = {

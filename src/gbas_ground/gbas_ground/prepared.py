@@ -25,7 +25,8 @@ from gbas_ground.monitors.ionosphere_gradient import GradientSite, IonosphereGra
 from gbas_ground.monitors.shared_receiver import Planes, planes_of
 from gbas_ground.params import GroundParams
 from gbas_vdb.messages.types import FasDataSet, Type2
-from gbas_vdb.transmission.schedule import ScheduleParams, sources_that_fit
+from gbas_vdb.transmission.frame import ScheduleParams
+from gbas_vdb.transmission.schedule import sources_that_fit
 
 
 class FrameSettings(NamedTuple):

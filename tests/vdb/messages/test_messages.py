@@ -12,10 +12,11 @@ from hypothesis import strategies as st
 
 from gbas_vdb.coding.bits import BitReader, BitWriter
 from gbas_vdb.errors import CrcError, FieldError, VdbError
-from gbas_vdb.messages import tables
+from gbas_vdb.messages import approach_tables, tables
 from gbas_vdb.messages import types as m
 from gbas_vdb.messages.block import BlockError, decode_block, decode_blocks, decode_body, encode_block, encode_body
-from gbas_vdb.messages.fields import Layout, Number, decode, encode
+from gbas_vdb.messages.fields import Number
+from gbas_vdb.messages.layout import Layout, decode, encode
 from vdb_fields import TABLES, drawn_record, raw_bounds, same, value_of
 from vdb_oracle import CRC32Q, air_bits, bytes_of_air_bits, crc_remainder_bits, field_bits
 
@@ -43,7 +44,7 @@ LAYOUTS: dict[str, Layout] = {
     "adb1": tables.ADDITIONAL_BLOCK_1,
     "adb3": tables.ADDITIONAL_BLOCK_3,
     "adb4": tables.ADDITIONAL_BLOCK_4,
-    "fas": tables.FAS_BLOCK,
+    "fas": approach_tables.FAS_BLOCK,
     "predicted_source": tables.PREDICTED_SOURCE,
     "obstructed_approach": tables.OBSTRUCTED_APPROACH,
 }

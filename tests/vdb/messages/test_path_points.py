@@ -14,8 +14,9 @@ from gbas_core.positioning.arinc424 import is_path_point, path_point
 from gbas_ground.approaches import fas_data_set
 from gbas_ground.params import GroundParams
 from gbas_vdb.coding.bits import BitReader, BitWriter
-from gbas_vdb.messages import tables
-from gbas_vdb.messages.fields import Choice, FieldError, Letter, decode, encode
+from gbas_vdb.messages import approach_tables, tables
+from gbas_vdb.messages.fields import Choice, FieldError, Letter
+from gbas_vdb.messages.layout import decode, encode
 from gbas_vdb.messages.path_point import PathPointError, checked_path_point, trusted_path_point
 from gbas_vdb.messages.types import FasBlock
 from vdb_oracle import CRC32Q, crc_remainder_bits
@@ -61,7 +62,7 @@ def test_block_has_the_published_crc(published: dict[str, Any]) -> None:
 @pytest.mark.parametrize("published", PUBLISHED, ids=lambda each: each["crc"])
 def test_block_decodes_to_what_was_published(published: dict[str, Any]) -> None:
     values = published["values"]
-    block = decode(tables.FAS_BLOCK, BitReader(checked_path_point(published["record"]).block[:34]))
+    block = decode(approach_tables.FAS_BLOCK, BitReader(checked_path_point(published["record"]).block[:34]))
     assert isinstance(block, FasBlock)
     assert (block.airport_id, block.runway_number, block.route_indicator) == (
         values["airport"], int(values["runway"]), values["route"],
@@ -76,7 +77,9 @@ def test_block_decodes_to_what_was_published(published: dict[str, Any]) -> None:
 def test_route_letters_are_ia5_codes() -> None:
     """I and O are never assigned; the place of a letter in a list without them is another code from J on."""
     letters = "ABCDEFGHJKLMNPQRSTUVWXYZ"
-    route = next(entry for entry in tables.FAS_BLOCK.entries if getattr(entry, "name", "") == "route_indicator")
+    route = next(
+        entry for entry in approach_tables.FAS_BLOCK.entries if getattr(entry, "name", "") == "route_indicator"
+    )
     assert [route.to_raw(letter) for letter in letters] == [ord(letter) - ord("@") for letter in letters]
     assert route.to_raw("") == 0
     for raw in (9, 15, 27, 31):
@@ -147,9 +150,9 @@ def test_an_approach_of_a_record_is_broadcast_as_the_record_says() -> None:
     approach = approach_from_mapping({"arinc424": RECORD})
     block = fas_data_set(approach).fas
     writer = BitWriter()
-    encode(tables.FAS_BLOCK, block, writer)
-    sent = decode(tables.FAS_BLOCK, BitReader(writer.to_bytes()))
-    published = decode(tables.FAS_BLOCK, BitReader(checked_path_point(RECORD).block[:34]))
+    encode(approach_tables.FAS_BLOCK, block, writer)
+    sent = decode(approach_tables.FAS_BLOCK, BitReader(writer.to_bytes()))
+    published = decode(approach_tables.FAS_BLOCK, BitReader(checked_path_point(RECORD).block[:34]))
     for name in ("airport_id", "runway_number", "route_indicator", "ltp_latitude_rad", "ltp_longitude_rad",
                  "ltp_height_m", "delta_fpap_latitude_rad", "delta_fpap_longitude_rad", "gpa_rad"):  # fmt: skip
         assert getattr(sent, name) == getattr(published, name), name

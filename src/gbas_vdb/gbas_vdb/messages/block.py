@@ -11,9 +11,9 @@ from typing import Any, Final
 from gbas_vdb.coding.bits import BitReader, BitWriter
 from gbas_vdb.coding.crc import crc32q
 from gbas_vdb.errors import CrcError, FieldError, VdbError
-from gbas_vdb.messages import tables
+from gbas_vdb.messages import approach_tables, tables
 from gbas_vdb.messages import types as m
-from gbas_vdb.messages.fields import Layout, decode, encode
+from gbas_vdb.messages.layout import Layout, decode, encode
 
 HEADER_BYTES: Final = 6
 CRC_BYTES: Final = 4
@@ -158,10 +158,10 @@ def _encode_type2(message: m.Type2) -> bytes:
 def _encode_data_set(data_set: m.FasDataSet | m.UnknownDataSet) -> bytes:
     if isinstance(data_set, m.UnknownDataSet):
         return bytes((len(data_set.data) + 1,)) + data_set.data
-    data = bytearray(_encoded(tables.FAS_DATA_SET, data_set))
-    end = tables.FAS_BLOCK_BYTES
+    data = bytearray(_encoded(approach_tables.FAS_DATA_SET, data_set))
+    end = approach_tables.FAS_BLOCK_BYTES
     data[end : end + CRC_BYTES] = crc32q(bytes(data[:end])).to_bytes(CRC_BYTES, "little")
-    return bytes((tables.FAS_DATA_SET_BYTES,)) + bytes(data)
+    return bytes((approach_tables.FAS_DATA_SET_BYTES,)) + bytes(data)
 
 
 def decode_block(data: bytes) -> MessageBlock:
@@ -283,7 +283,7 @@ def _decode_type4(body: bytes) -> tuple[m.Type4, tuple[str, ...]]:
             raise VdbError(f"data set length {length} outside 1 to {len(body) - start}")
         data = body[start + 1 : start + length]
         start += length
-        if length != tables.FAS_DATA_SET_BYTES:
+        if length != approach_tables.FAS_DATA_SET_BYTES:
             data_sets.append(m.UnknownDataSet(data=data))
             notes.append(f"data set of {length} bytes is not a FAS")
             continue
@@ -292,12 +292,12 @@ def _decode_type4(body: bytes) -> tuple[m.Type4, tuple[str, ...]]:
 
 
 def _decode_fas(data: bytes, position: int) -> m.FasDataSet:
-    end = tables.FAS_BLOCK_BYTES
+    end = approach_tables.FAS_BLOCK_BYTES
     received = int.from_bytes(data[end : end + CRC_BYTES], "little")
     computed = crc32q(data[:end])
     if received != computed:
         raise CrcError(f"FAS block CRC failed in data set {position}: {received:#010x}, computed {computed:#010x}")
-    data_set: m.FasDataSet = decode(tables.FAS_DATA_SET, BitReader(data))
+    data_set: m.FasDataSet = decode(approach_tables.FAS_DATA_SET, BitReader(data))
     return data_set
 
 

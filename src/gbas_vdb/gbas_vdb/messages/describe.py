@@ -23,22 +23,24 @@ from gbas_vdb.coding.bits import BitArray, bits_msb_first
 from gbas_vdb.coding.fec import correct_fec, encode_fec
 from gbas_vdb.coding.radio import decode_burst_bits
 from gbas_vdb.errors import VdbError
-from gbas_vdb.messages import tables
+from gbas_vdb.messages import approach_tables, tables
 from gbas_vdb.messages import types as m
 from gbas_vdb.messages.block import BlockError, MessageBlock, decode_blocks, encode_block, message_type_of
 from gbas_vdb.messages.fields import (
     Choice,
     Count,
-    Entry,
-    Group,
-    Layout,
     Letter,
     Number,
-    Part,
     Spare,
     Switch,
     Text,
     Vector,
+)
+from gbas_vdb.messages.layout import (
+    Entry,
+    Group,
+    Layout,
+    Part,
 )
 
 Document = dict[str, Any]
@@ -169,7 +171,7 @@ def message_document(message: m.Message) -> Document:
 def _data_set_document(data_set: m.FasDataSet | m.UnknownDataSet) -> Document:
     if isinstance(data_set, m.UnknownDataSet):
         return {"data_hex": _hex(data_set.data)}
-    return _to_plain(tables.FAS_DATA_SET, data_set)
+    return _to_plain(approach_tables.FAS_DATA_SET, data_set)
 
 
 def _hex(data: bytes) -> str:
@@ -307,7 +309,7 @@ def _data_set_of(document: Any, path: str) -> m.FasDataSet | m.UnknownDataSet:
     _require_object(document, path)
     if "data_hex" in document:
         return m.UnknownDataSet(data=_bytes_at(document, "data_hex", path))
-    data_set: m.FasDataSet = _from_plain(tables.FAS_DATA_SET, document, path)
+    data_set: m.FasDataSet = _from_plain(approach_tables.FAS_DATA_SET, document, path)
     return data_set
 
 

@@ -18,8 +18,8 @@ from gbas_core.positioning.arinc424 import PathPoint, is_path_point, path_point
 from gbas_vdb.coding.bits import BitWriter
 from gbas_vdb.coding.crc import crc32q
 from gbas_vdb.errors import VdbError
-from gbas_vdb.messages.fields import encode
-from gbas_vdb.messages.tables import FAS_BLOCK
+from gbas_vdb.messages.approach_tables import FAS_BLOCK
+from gbas_vdb.messages.layout import encode
 from gbas_vdb.messages.types import FasBlock
 
 _LIMIT_STEPS_PER_M: Final = 5

@@ -10,15 +10,21 @@ import math
 from fractions import Fraction
 from typing import Final
 
-from gbas_vdb.messages.fields import Choice, Count, Group, Layout, Letter, Number, Part, Spare, Switch, Text, Vector
+from gbas_vdb.messages.fields import (
+    Choice,
+    Count,
+    Number,
+    Spare,
+    Text,
+    Vector,
+)
+from gbas_vdb.messages.layout import Group, Layout
 from gbas_vdb.messages.types import (
     AdditionalBlock1,
     AdditionalBlock3,
     AdditionalBlock4,
     Correction30,
     Correction100,
-    FasBlock,
-    FasDataSet,
     ObstructedApproach,
     PredictedSource,
     Type1,
@@ -30,8 +36,8 @@ from gbas_vdb.messages.types import (
 MAX_MEASUREMENTS: Final = 18
 
 # Angles are sent in units of 0.0005 seconds of arc.
-_ANGLE: Final = math.radians(0.0005 / 3600.0)
-_COUNTS_PER_DEGREE: Final = 7_200_000
+ANGLE: Final = math.radians(0.0005 / 3600.0)
+COUNTS_PER_DEGREE: Final = 7_200_000
 
 _Z_COUNT: Final = Number(
     name="modified_z_count_s",
@@ -168,27 +174,27 @@ TYPE_11: Final = Layout(
 )
 
 
-def _latitude(name: str) -> Number:
+def latitude(name: str) -> Number:
     return Number(
         name=name,
         bits=32,
         signed=True,
-        scale=_ANGLE,
-        minimum=-90 * _COUNTS_PER_DEGREE,
-        maximum=90 * _COUNTS_PER_DEGREE,
+        scale=ANGLE,
+        minimum=-90 * COUNTS_PER_DEGREE,
+        maximum=90 * COUNTS_PER_DEGREE,
         unit="rad",
         doc="geodetic latitude, WGS-84",
     )
 
 
-def _longitude(name: str) -> Number:
+def longitude(name: str) -> Number:
     return Number(
         name=name,
         bits=32,
         signed=True,
-        scale=_ANGLE,
-        minimum=-180 * _COUNTS_PER_DEGREE,
-        maximum=180 * _COUNTS_PER_DEGREE,
+        scale=ANGLE,
+        minimum=-180 * COUNTS_PER_DEGREE,
+        maximum=180 * COUNTS_PER_DEGREE,
         unit="rad",
         doc="longitude, WGS-84, east positive",
     )
@@ -229,8 +235,8 @@ TYPE_2: Final = Layout(
         Number(
             name="refractivity_uncertainty", bits=8, scale=Fraction(1), rounding="up", doc="standard deviation of N_r"
         ),
-        _latitude("latitude_rad"),
-        _longitude("longitude_rad"),
+        latitude("latitude_rad"),
+        longitude("longitude_rad"),
         Number(
             name="ellipsoid_height_m",
             bits=24,
@@ -293,93 +299,6 @@ ADDITIONAL_BLOCKS: Final[dict[int, tuple[str, Layout]]] = {
     3: ("adb3", ADDITIONAL_BLOCK_3),
     4: ("adb4", ADDITIONAL_BLOCK_4),
 }
-
-
-def _fpap_offset(name: str) -> Number:
-    return Number(
-        name=name,
-        bits=24,
-        signed=True,
-        minimum=-_COUNTS_PER_DEGREE,
-        maximum=_COUNTS_PER_DEGREE,
-        scale=_ANGLE,
-        unit="rad",
-        doc="FPAP less LTP",
-    )
-
-
-FAS_BLOCK: Final = Layout(
-    record=FasBlock,
-    entries=(
-        Number(name="operation_type", bits=4, doc="0 is straight-in"),
-        Number(name="sbas_provider", bits=4, doc="14 GBAS only, 15 any"),
-        Text(name="airport_id", characters=4, bits_per_character=8),
-        Number(name="runway_number", bits=6, maximum=36, doc="0: point in space"),
-        Choice(name="runway_letter", bits=2, values=("", "R", "C", "L")),
-        Number(name="approach_performance_designator", bits=3, doc="0 GAST-A/B, 1 GAST-C, 2 GAST-C and D"),
-        Letter(name="route_indicator", unused="IO"),
-        Number(name="reference_path_data_selector", bits=8, maximum=48),
-        Text(name="reference_path_identifier", characters=4, bits_per_character=8),
-        _latitude("ltp_latitude_rad"),
-        _longitude("ltp_longitude_rad"),
-        Number(name="ltp_height_m", bits=16, scale=Fraction(1, 10), offset=-512, unit="m", doc="above the ellipsoid"),
-        _fpap_offset("delta_fpap_latitude_rad"),
-        _fpap_offset("delta_fpap_longitude_rad"),
-        Switch(
-            on="tch_in_feet",
-            cases={True: Number(name="tch_m", bits=15, scale=Fraction(3048, 100_000), unit="m")},
-            default=Number(name="tch_m", bits=15, scale=Fraction(1, 20), unit="m", doc="threshold crossing height"),
-        ),
-        Choice(name="tch_in_feet", bits=1, values=(True, False)),
-        Number(name="gpa_rad", bits=16, scale=math.radians(0.01), maximum=9000, unit="rad", doc="glide path angle"),
-        Number(
-            name="course_width_m", bits=8, scale=Fraction(1, 4), offset=80, unit="m", doc="semi-width at the threshold"
-        ),
-        Number(
-            name="delta_length_offset_m",
-            bits=8,
-            scale=Fraction(8),
-            maximum=0xFE,
-            codes={0xFF: math.nan},
-            unit="m",
-            doc="stop end of the runway to FPAP",
-        ),
-    ),
-)
-
-
-def _vertical_limit(counts_per_metre: int) -> Number:
-    return Number(
-        name="fasval_m",
-        bits=8,
-        scale=Fraction(1, counts_per_metre),
-        maximum=0xFE,
-        codes={0xFF: math.nan},
-        rounding="down",
-        unit="m",
-        doc="vertical alert limit; missing: no vertical guidance",
-    )
-
-
-# Follows the FAS block and its CRC.
-FAS_LIMITS: Final = (
-    Switch(on="fas.approach_performance_designator", cases={0: _vertical_limit(5)}, default=_vertical_limit(10)),
-    Number(
-        name="faslal_m",
-        bits=8,
-        scale=Fraction(1, 5),
-        maximum=0xFE,
-        codes={0xFF: math.nan},
-        rounding="down",
-        unit="m",
-        doc="lateral alert limit; missing: do not use",
-    ),
-)
-FAS_DATA_SET: Final = Layout(
-    record=FasDataSet, entries=(Part(name="fas", layout=FAS_BLOCK), Spare(bits=32), *FAS_LIMITS)
-)
-FAS_BLOCK_BYTES: Final = 34
-FAS_DATA_SET_BYTES: Final = 41
 
 PREDICTED_SOURCE: Final = Layout(
     record=PredictedSource,
