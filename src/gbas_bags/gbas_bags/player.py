@@ -28,8 +28,8 @@ from gbas_msgs_py import topics
 from gbas_msgs_py.qos import qos_of
 from gbas_msgs_py.ros import qos_profile
 from gbas_node.driver import DriverNode
-from gbas_node.node import run
 from gbas_node.params import DriverParams
+from gbas_node.serving import run
 
 NODE_NAME: Final = "player"
 ACK_TIMEOUT_S: Final = 10.0
@@ -151,7 +151,7 @@ class Player(DriverNode[PlayedEpoch]):
             raise BagError(self._path, f"{name}: {error}") from error
         needed = self._inputs_only and (is_observation(name) or is_ephemeris(name))
         publisher = self.create_publisher(kind, name, qos_profile(qos_of(contract_name(name))))
-        self._gated.append((publisher, int(needed) + self.params.recorders))
+        self.gate.add(publisher, int(needed) + self.params.recorders)
         return publisher
 
     def due(self, now_s: float) -> float:

@@ -42,8 +42,9 @@ from gbas_core.parameters import Parameter, ParameterError, parameters
 from gbas_msgs_py import topics
 from gbas_msgs_py.qos import qos_of
 from gbas_msgs_py.tables import schema_dictionary
-from gbas_node.node import EXIT_FAILED, GbasNode, run
+from gbas_node.node import EXIT_FAILED, GbasNode
 from gbas_node.params import NodeParams
+from gbas_node.serving import run
 
 NODE_NAME: Final = "recorder"
 SCHEMAS_METADATA: Final = "gbas.schemas"

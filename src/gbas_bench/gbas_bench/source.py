@@ -7,8 +7,8 @@ from typing import Annotated, Any
 
 from gbas_bench.world import crowded
 from gbas_core.parameters import Parameter, ParameterError, parameters
-from gbas_node.node import run
 from gbas_node.pacing import Playback
+from gbas_node.serving import run
 from gbas_sim.nodes.simulator import Simulator, SimulatorParams
 from gbas_sim.world import SimulatedEpoch, World
 

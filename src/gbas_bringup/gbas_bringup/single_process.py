@@ -9,7 +9,7 @@ from functools import partial
 
 from gbas_bringup.node_kinds import NODE_KINDS
 from gbas_core.errors import GbasError
-from gbas_node.node import Factory, run
+from gbas_node.serving import Factory, run
 
 
 def factory_of(full_name: str) -> Factory:

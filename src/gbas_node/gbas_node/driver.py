@@ -148,7 +148,7 @@ class DriverNode(GbasNode, Generic[E]):
         self._next = next(self._epochs, None) if self._epochs is not None else None
 
     def _readers_are_there(self, now_s: float) -> bool:
-        self._lacking = self.missing_readers()
+        self._lacking = self.gate.missing_readers()
         silent = [reader for reader in self.readers if not self.has_progress_publisher(reader)]
         self._lacking += [f"no node reports progress as {reader}" for reader in silent]
         if self._lacking:

@@ -5,32 +5,26 @@ A node decodes, calls one step, encodes; everything that every node does is here
 - Parameters are those of the class in ``params_type`` (:mod:`gbas_core.parameters`). Unknown names, wrong types and
   values out of bounds end the program with one line and exit code 2.
 - A message that cannot be decoded is dropped, counted and reported in ``/diagnostics``; the node goes on.
-- The first epoch is held back until every output has its readers, so a chain of processes loses nothing at its start.
-- SIGINT and SIGTERM let the node publish what is pending; the exit code is then 0.
+- The first epoch is held back until every output has its readers, so a chain of processes loses nothing at its start
+  (:mod:`gbas_node.start_gate`).
+- SIGINT and SIGTERM let the node publish what is pending; the exit code is then 0 (:mod:`gbas_node.serving`).
 
 Programs that run nodes must be started as console scripts or with ``python -m``: the ROS wheels re-execute Python once.
 """
 
 from __future__ import annotations
 
-import os
-import signal
-import sys
-import threading
 import time
-from collections import Counter, deque
-from collections.abc import Callable, Iterable, Sequence
-from typing import Any, ClassVar, Final, Generic, TypeVar
+from collections import Counter
+from collections.abc import Callable, Iterable
+from typing import Any, ClassVar, Final, TypeVar
 
-import rclpy
-import rclpy.utilities
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos_overriding_options import QoSOverridingOptions
-from rclpy.signals import SignalHandlerOptions
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float64, Float64MultiArray, String, UInt8, UInt8MultiArray
 
@@ -46,15 +40,15 @@ from gbas_msgs_py.qos import qos_of
 from gbas_msgs_py.schema import SchemaError, TableSchema
 from gbas_msgs_py.tables import EPHEMERIS, PROGRESS, ProgressEpoch
 from gbas_node.descriptors import descriptor_of
+from gbas_node.inputs import InputWatch
 from gbas_node.params import NodeParams
-from gbas_node.transport import use_profile
+from gbas_node.publishers import TablePublisher, when_heard
+from gbas_node.start_gate import StartGate
 from gbas_vdb.transmission.burst import Burst
 
 R = TypeVar("R", bound=Record)
-Factory = Callable[[], "GbasNode"]
 
 EXIT_OK: Final = 0
-EXIT_BAD_START: Final = 2
 EXIT_FAILED: Final = 3
 STATUS_OK: Final = DiagnosticStatus.OK
 STATUS_WARN: Final = DiagnosticStatus.WARN
@@ -64,28 +58,11 @@ REPORT_PERIOD_S: Final = 1.0
 PROBLEM_REPORT_S: Final = 0.1
 """A problem is reported this soon, not only with the next regular report."""
 _PROGRESS: Final = TableCodec(PROGRESS)
-_POLL_S: Final = 0.1
+POLL_S: Final = 0.1
 _GATE_POLL_S: Final = 0.01
-_GRACE_S: Final = 0.005
 _LAST_ACK_S: Final = 2.0
 SECTIONS: Final = ("ground", "airborne", "sim", "qos_overrides")
 """First words of dotted parameters that belong to a part of the suite; one file may hold them for all nodes."""
-
-
-class TablePublisher(Generic[R]):
-    """Publishes records of one schema."""
-
-    def __init__(self, publisher: Publisher, schema: TableSchema[R]) -> None:
-        self._publisher = publisher
-        self._codec = TableCodec(schema)
-
-    def settled(self, timeout_s: float) -> bool:
-        """Wait until all readers have what was sent; False when that takes longer than the time-out."""
-        return bool(self._publisher.wait_for_all_acked(Duration(seconds=timeout_s)))
-
-    def publish(self, record: R) -> None:
-        """Encode and send a record."""
-        self._publisher.publish(self._codec.encode(record))
 
 
 class GbasNode(Node):
@@ -110,21 +87,15 @@ class GbasNode(Node):
         kwargs.setdefault("namespace", topics.DEFAULT_NAMESPACE)
         super().__init__(name, **kwargs)
         self.params: Any = self._own_params()
-        self.activity = 0
+        self.inputs = InputWatch()
         self.exit_code: int | None = None
         self.processed = 0
         self.last_epoch: tuple[int, float] | None = None
         self.problems: Counter[str] = Counter()
         self.last_problem = ""
         self._reported_problems = 0
-        self._heard_s = time.monotonic()
-        self._first_heard_s: float | None = None
-        self._overdue_at: int | None = None
         self._report_due_s = 0.0
-        self._gated: list[tuple[Publisher, int]] = []
-        self._backlog: deque[Callable[[], None]] = deque()
-        self._backlog_since_s: float | None = None
-        self._open = False
+        self.gate = StartGate(self.params.start_wait_s)
         self._events = self._gated_publisher(String, topics.EVENTS, 0)
         self._diagnostics = self._publisher(DiagnosticArray, topics.DIAGNOSTICS)
         self._progress = self._publisher(Float64MultiArray, topics.progress(self.get_name()))
@@ -182,33 +153,15 @@ class GbasNode(Node):
 
     def float_publisher(self, topic: str) -> Callable[[float], None]:
         """Function that sends a number; nothing is made when nobody listens."""
-        publisher = self._gated_publisher(Float64, topic, 0)
-
-        def publish(value: float) -> None:
-            if publisher.get_subscription_count():
-                publisher.publish(cdr.encode_float(value))
-
-        return publish
+        return when_heard(self._gated_publisher(Float64, topic, 0), cdr.encode_float)
 
     def uint8_publisher(self, topic: str) -> Callable[[int], None]:
         """Function that sends a small integer; nothing is made when nobody listens."""
-        publisher = self._gated_publisher(UInt8, topic, 0)
-
-        def publish(value: int) -> None:
-            if publisher.get_subscription_count():
-                publisher.publish(cdr.encode_uint8(value))
-
-        return publish
+        return when_heard(self._gated_publisher(UInt8, topic, 0), cdr.encode_uint8)
 
     def clock_publisher(self) -> Callable[[int, float], None]:
         """Function that sets ``/clock`` to an epoch; for whoever drives time."""
-        publisher = self._publisher(Clock, topics.CLOCK)
-
-        def publish(gps_week: int, tow_s: float) -> None:
-            if publisher.get_subscription_count():
-                publisher.publish(cdr.encode_clock(gps_week, tow_s))
-
-        return publish
+        return when_heard(self._publisher(Clock, topics.CLOCK), cdr.encode_clock)
 
     def publish_schemas(self) -> None:
         """Put the schema dictionary on its topic, where late readers find it."""
@@ -237,7 +190,7 @@ class GbasNode(Node):
 
     def _gated_publisher(self, message_type: type, topic: str, readers: int) -> Publisher:
         publisher = self._publisher(message_type, topic)
-        self._gated.append((publisher, readers + self.params.recorders))
+        self.gate.add(publisher, readers + self.params.recorders)
         return publisher
 
     # --- inputs
@@ -280,15 +233,14 @@ class GbasNode(Node):
         quiet: bool,
     ) -> None:
         def receive(data: bytes) -> None:
-            self.activity += 1
+            self.inputs.activity += 1
             try:
                 item = decode(data)
             except SchemaError as error:
                 self.problem(f"bad message on {topic}", str(error))
                 return
             if not quiet:
-                self._heard_s = time.monotonic()
-                self._first_heard_s = self._first_heard_s or self._heard_s
+                self.inputs.heard()
             callback(item)
 
         options = QoSOverridingOptions.with_default_policies()
@@ -313,63 +265,30 @@ class GbasNode(Node):
 
     def silent_s(self, now_s: float) -> float:
         """Time since the last input [s]."""
-        return now_s - self._heard_s
+        return self.inputs.silent_s(now_s)
 
     def enforce(self, joiner: Any, now_s: float, steps: Callable[[Any], None]) -> float:
-        """Let a joiner give up on what is overdue; returns seconds until the next deadline.
-
-        Inputs that were never heard get the time of the start. What is overdue is given one more chance to be received:
-        the deadline may have passed while this process did not run.
-        """
-        deadline_s = joiner.deadline_s
-        first_s = self._first_heard_s
-        if deadline_s is None or first_s is None:
-            return _POLL_S
-        if not joiner.heard_all:
-            deadline_s = max(deadline_s, first_s + self.params.start_wait_s)
-        if now_s < deadline_s:
-            return float(deadline_s - now_s)
-        if self._overdue_at != self.activity:
-            self._overdue_at = self.activity
-            return _GRACE_S
-        steps(joiner.expire(now_s))
-        return 0.0
+        """Let a joiner give up on what is overdue; returns seconds until the next deadline."""
+        wait_s = self.inputs.wait_s(joiner, now_s, self.params.start_wait_s)
+        if wait_s == 0.0:
+            steps(joiner.expire(now_s))
+        return wait_s
 
     # --- start gate
 
     def when_ready(self, work: Callable[[], None]) -> None:
         """Do the work now, or as soon as the outputs have their readers; work keeps its order."""
-        if self._open:
-            work()
-            return
-        self._backlog.append(work)
-        if self._backlog_since_s is None:
-            self._backlog_since_s = time.monotonic()
-
-    def missing_readers(self) -> list[str]:
-        """Outputs that have fewer readers than they need, with how many."""
-        counts = [(p.topic_name, p.get_subscription_count(), needed) for p, needed in self._gated]
-        return [f"{name} has {count} of {needed} readers" for name, count, needed in counts if count < needed]
-
-    def starting(self) -> bool:
-        """Whether an input that was never heard may still be waited for."""
-        since = self._backlog_since_s
-        return since is None or time.monotonic() < since + self.params.start_wait_s
+        self.gate.when_ready(work)
 
     def _poll_gate(self) -> None:
-        if self._open or self._backlog_since_s is None:
+        if not self.gate.waiting:
             return
-        lacking = self.missing_readers()
-        if lacking and self.starting():
+        lacking = self.gate.missing_readers()
+        if lacking and self.gate.starting:
             return
         if lacking:
             self.problem("started without readers", "; ".join(lacking))
-        self._open_gate()
-
-    def _open_gate(self) -> None:
-        self._open = True
-        while self._backlog:
-            self._backlog.popleft()()
+        self.gate.open()
 
     # --- life
 
@@ -384,12 +303,12 @@ class GbasNode(Node):
             self._report_due_s = now + REPORT_PERIOD_S
             self._report(now)
             self._publish_progress()  # a reader that was discovered late would wait for it for ever
-        wait = self.due(now) if idle else _POLL_S
-        return min(wait, _POLL_S if self._open or self._backlog_since_s is None else _GATE_POLL_S)
+        wait = self.due(now) if idle else POLL_S
+        return min(wait, _GATE_POLL_S if self.gate.waiting else POLL_S)
 
     def due(self, now_s: float) -> float:
         """Enforce deadlines (overridden by nodes that have any); returns seconds until the next."""
-        return _POLL_S
+        return POLL_S
 
     def finish(self) -> None:
         """Publish what is pending; called once, when the node ends in an orderly way."""
@@ -410,7 +329,7 @@ class GbasNode(Node):
     def close(self, *, orderly: bool) -> None:
         """Finish and release the node."""
         if orderly:
-            self._open_gate()
+            self.gate.open()
             self.finish()
             self._report(time.monotonic(), final=True)
             deadline_s = time.monotonic() + _LAST_ACK_S  # for all together: a reader that was killed never answers
@@ -450,7 +369,7 @@ class GbasNode(Node):
         self._reported_problems = self.problems.total()
         silent_s = self.silent_s(now_s)
         if self.last_epoch is None and not fresh:
-            waiting = "; ".join(self.missing_readers()) if self._backlog else "no data yet"
+            waiting = "; ".join(self.gate.missing_readers()) if self.gate.backlog else "no data yet"
             return STATUS_STALE, f"waiting: {waiting}"
         if silent_s > self.params.silence_s:
             return STATUS_ERROR, f"no input for {silent_s:.0f} s"
@@ -462,112 +381,3 @@ class GbasNode(Node):
 def _plain(value: Any) -> Any:
     """A ROS parameter's value; an empty list has no type in ROS, and comes as none."""
     return list(value) if hasattr(value, "typecode") else [] if value is None else value
-
-
-def run(factories: Factory | Sequence[Factory], args: Sequence[str] | None = None) -> None:
-    """Run one node, or several in one process, until a signal or until one of them ends; then exit.
-
-    Exit codes: 0 in order, 2 for parameters or files that cannot be used, 3 when a node gives up.
-    """
-    sys.exit(serve([factories] if callable(factories) else list(factories), args))
-
-
-def serve(factories: Sequence[Factory], args: Sequence[str] | None = None) -> int:
-    """As :func:`run`, but returns the exit code."""
-    signals = _Signals()
-    nodes: list[GbasNode] = []
-    use_profile(os.environ)
-    try:
-        rclpy.init(args=None if args is None else list(args), signal_handler_options=SignalHandlerOptions.NO)
-        for factory in factories:
-            nodes.append(factory())
-            nodes[-1].check_overrides()
-    except (ValueError, OSError, RuntimeError) as error:
-        print(_start_error(error), file=sys.stderr, flush=True)
-        _release(nodes, None, orderly=False)
-        return EXIT_BAD_START
-    executor = _executor()
-    for node in nodes:
-        executor.add_node(node)
-    orderly = False
-    try:
-        _spin(executor, nodes, signals)
-        orderly = True
-    finally:
-        _release(nodes, executor, orderly=orderly)
-    codes = [node.exit_code for node in nodes if node.exit_code]
-    return max(codes, default=EXIT_OK)
-
-
-def _spin(executor: Any, nodes: Sequence[GbasNode], signals: _Signals) -> None:
-    signals.wake = lambda: executor.create_task(lambda: None)
-    wait_s, poll_at_s = 0.0, 0.0
-    while not signals.stop.is_set() and all(node.exit_code is None for node in nodes):
-        before = sum(node.activity for node in nodes)
-        executor.spin_once(timeout_sec=wait_s)
-        idle = before == sum(node.activity for node in nodes)
-        now = time.monotonic()
-        if idle or now >= poll_at_s:
-            poll_at_s = now + _POLL_S
-            due_s = min(node.poll(idle) for node in nodes)
-        wait_s = due_s if idle else 0.0
-
-
-def _release(nodes: Sequence[GbasNode], executor: Any, *, orderly: bool) -> None:
-    for node in nodes:
-        if executor is not None:
-            executor.remove_node(node)
-        node.close(orderly=orderly)
-    if executor is not None:
-        executor.shutdown()
-    rclpy.utilities.try_shutdown()
-
-
-def _executor() -> Any:
-    """The executor that costs least a message (117 against 235 us); the plain one where it is missing."""
-    try:
-        from rclpy.experimental.events_executor import EventsExecutor
-    except ImportError:
-        from rclpy.executors import SingleThreadedExecutor
-
-        return SingleThreadedExecutor()
-    return EventsExecutor()
-
-
-def _start_error(error: Exception) -> str:
-    program = os.path.basename(sys.argv[0]).removesuffix(".py")
-    return f"{program}: {str(error).strip()}"
-
-
-class _Signals:
-    """SIGINT and SIGTERM as a flag.
-
-    The signals are blocked and awaited by a thread: a handler would run only once the executor returns to Python, and
-    rclpy's own handlers end the context before anything pending can be published. A second signal ends at once; one
-    that comes while nodes are being made ends them as soon as they are. Threads of libraries that were loaded before do
-    not block them (those of BLAS); for what reaches these there is a handler as well.
-    """
-
-    _AWAITED: Final = frozenset({signal.SIGINT, signal.SIGTERM})
-
-    def __init__(self) -> None:
-        self.stop = threading.Event()
-        self.wake: Callable[[], Any] | None = None
-        for number in self._AWAITED:
-            signal.signal(number, signal.SIG_DFL)  # a shell starts background jobs with SIGINT ignored
-        signal.pthread_sigmask(signal.SIG_BLOCK, self._AWAITED)
-        for number in self._AWAITED:
-            signal.signal(number, lambda *_: self._received())
-        threading.Thread(target=self._await, name="signals", daemon=True).start()
-
-    def _await(self) -> None:
-        while True:
-            signal.sigwait(self._AWAITED)
-            self._received()
-
-    def _received(self) -> None:
-        if self.stop.is_set():
-            os._exit(130)
-        self.stop.set()
-        if self.wake is not None:  # before, the nodes are still being made; what they have received by then counts
-            self.wake()

@@ -13,8 +13,9 @@ from gbas_core.gnss.gpstime import epoch_key, from_epoch_key
 from gbas_core.gnss.observations import ObservationEpoch
 from gbas_msgs_py import tables, topics
 from gbas_msgs_py.joining import AirborneInput, AirborneJoiner
-from gbas_node.node import GbasNode, run
+from gbas_node.node import GbasNode
 from gbas_node.params import JoiningParams
+from gbas_node.serving import run
 from gbas_vdb.transmission.burst import Burst
 
 

@@ -17,8 +17,9 @@ from gbas_msgs_py.codes import EventKind, ServiceType
 from gbas_msgs_py.events import Event
 from gbas_msgs_py.records import ProtectionEpoch, SolutionEpoch
 from gbas_msgs_py.ros import fix_from_solution
-from gbas_node.node import GbasNode, run
+from gbas_node.node import GbasNode
 from gbas_node.params import ConfiguredParams
+from gbas_node.serving import run
 
 
 class ProtectionLevel(GbasNode):

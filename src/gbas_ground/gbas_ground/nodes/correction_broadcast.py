@@ -11,8 +11,9 @@ from gbas_ground.station import GroundStation
 from gbas_msgs_py import tables, topics
 from gbas_msgs_py.records import IntegrityEpoch
 from gbas_msgs_py.ros import empty_frame
-from gbas_node.node import GbasNode, run
+from gbas_node.node import GbasNode
 from gbas_node.params import ConfiguredParams
+from gbas_node.serving import run
 
 
 class CorrectionBroadcast(GbasNode):

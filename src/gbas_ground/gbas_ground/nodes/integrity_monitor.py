@@ -12,8 +12,9 @@ from gbas_ground.nodes.configuration import station_params
 from gbas_ground.station import GroundEpoch, GroundStation
 from gbas_msgs_py import tables, topics
 from gbas_msgs_py.joining import EpochJoiner, JoinedEpoch
-from gbas_node.node import GbasNode, run
+from gbas_node.node import GbasNode
 from gbas_node.params import JoiningParams
+from gbas_node.serving import run
 
 
 class IntegrityMonitor(GbasNode):

@@ -16,8 +16,8 @@ from gbas_core.satellites import satellites_of
 from gbas_msgs_py import tables, topics
 from gbas_msgs_py.records import MAX_REFERENCE_RECEIVERS
 from gbas_node.driver import DriverNode, EphemerisFeed
-from gbas_node.node import run
 from gbas_node.params import DriverParams
+from gbas_node.serving import run
 
 
 @parameters

@@ -13,8 +13,8 @@ from gbas_msgs_py import tables, topics
 from gbas_msgs_py.joining import ReceptionQueue
 from gbas_msgs_py.tables import TruthEpoch
 from gbas_node.driver import DriverNode
-from gbas_node.node import run
 from gbas_node.params import DriverParams
+from gbas_node.serving import run
 from gbas_sim.params import TroposphereSection
 from gbas_sim.scenario import SECTION, open_world, read_sections, scenario_from_mapping, sim_params
 from gbas_sim.world import SimulatedEpoch, Truth, World
