@@ -25,7 +25,7 @@ from gbas_ground.channels.tracking import TrackGroup, filter_params, initial_tra
 from gbas_ground.monitors.ionosphere_gradient import IonosphereGradientParams
 from gbas_ground.params import GroundParams
 from gbas_msgs_py.joining import ReceptionQueue
-from gbas_sim.world import SimulatedEpoch
+from gbas_sim.simulated_epochs import SimulatedEpoch
 from ground_runs import receiver_values
 from recorded_sets import recorded_sets
 

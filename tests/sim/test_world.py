@@ -18,7 +18,9 @@ from gbas_core.signals import BANDS, L1, L2, L5, SPEED_OF_LIGHT_MPS, WAVELENGTH_
 from gbas_sim.atmosphere.troposphere import Troposphere
 from gbas_sim.flight.straight_in import StraightIn
 from gbas_sim.receivers.receiver import AIRBORNE_RECEIVER, GROUND_RECEIVER, ReceiverParams, cn0_dbhz, noise_sigmas
-from gbas_sim.world import SimulatedEpoch, World, WorldParams
+from gbas_sim.simulated_epochs import SimulatedEpoch
+from gbas_sim.world import World
+from gbas_sim.world_params import WorldParams
 
 SITES = (
     (3840619.039, 715604.228, 5024909.863),

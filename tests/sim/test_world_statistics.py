@@ -24,7 +24,8 @@ from gbas_sim.faults.signal_faults import FAULT_MODES, CodeCarrierDivergence
 from gbas_sim.receivers.presets import ground_receiver
 from gbas_sim.receivers.receiver import GROUND_RECEIVER, ReceiverParams
 from gbas_sim.receivers.receiver_model import ReceiverModel
-from gbas_sim.world import World, WorldParams
+from gbas_sim.world import World
+from gbas_sim.world_params import WorldParams
 
 SITES = (
     (3840619.039, 715604.228, 5024909.863),

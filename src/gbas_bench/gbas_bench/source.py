@@ -10,7 +10,8 @@ from gbas_core.parameters import Parameter, ParameterError, parameters
 from gbas_node.pacing import Playback
 from gbas_node.serving import run
 from gbas_sim.nodes.simulator import Simulator, SimulatorParams
-from gbas_sim.world import SimulatedEpoch, World
+from gbas_sim.simulated_epochs import SimulatedEpoch
+from gbas_sim.world import World
 
 
 @parameters

@@ -22,7 +22,8 @@ from gbas_core.satellites import N_GPS, N_SATS
 from gbas_sim.satellites.broadcast import Orbits
 from gbas_sim.satellites.sightlines import elevations_rad
 from gbas_sim.scenario import scenario_from_yaml
-from gbas_sim.world import World, WorldParams, open_orbits
+from gbas_sim.world import World, open_orbits
+from gbas_sim.world_params import WorldParams
 
 CONFIG: Final = "bench.yaml"
 SATELLITES_A_SYSTEM: Final = 15

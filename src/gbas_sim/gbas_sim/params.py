@@ -19,7 +19,7 @@ from gbas_sim.flight.straight_in import StraightInParams
 from gbas_sim.receivers.presets import AnyPreset
 from gbas_sim.receivers.receiver import AIRBORNE_RECEIVER, GROUND_RECEIVER, AirborneReceiverParams, ReceiverParams
 from gbas_sim.receivers.site_scene import Building, SceneParams
-from gbas_sim.world import ConstellationParams, RunParams
+from gbas_sim.world_params import ConstellationParams, RunParams
 
 
 @parameters

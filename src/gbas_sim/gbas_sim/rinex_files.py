@@ -22,7 +22,8 @@ from gbas_core.gnss.gpstime import SECONDS_PER_WEEK, calendar_from_gps
 from gbas_core.gnss.observations import ObservationEpoch
 from gbas_core.satellites import IS_GPS, SAT_IDS
 from gbas_core.signals import L1, L5, WAVELENGTH_M
-from gbas_sim.world import SimulatedEpoch, Truth, World
+from gbas_sim.simulated_epochs import SimulatedEpoch, Truth
+from gbas_sim.world import World
 
 VERSION: Final = "3.05"
 LABEL: Final = "SIMULATED DATA - NOT FROM ANY RECEIVER OR SATELLITE"

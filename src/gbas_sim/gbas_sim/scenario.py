@@ -57,7 +57,8 @@ from gbas_sim.receivers.presets import preset_receiver
 from gbas_sim.receivers.receiver import ReceiverParams
 from gbas_sim.receivers.receiver_model import ReceiverModel
 from gbas_sim.receivers.site_scene import Building
-from gbas_sim.world import FlightPath, RunParams, World, WorldParams
+from gbas_sim.world import World
+from gbas_sim.world_params import FlightPath, RunParams, WorldParams
 
 SECTION: Final = "sim"
 

@@ -13,7 +13,8 @@ from gbas_ground.monitors.gradient_estimates import LEAST_ANGLE_RAD, front_speed
 from gbas_sim.atmosphere.fronts import WedgeFront
 from gbas_sim.atmosphere.troposphere import Troposphere as SimulatedTroposphere
 from gbas_sim.receivers.presets import receiver_preset
-from gbas_sim.world import World, WorldParams
+from gbas_sim.world import World
+from gbas_sim.world_params import WorldParams
 from monitor_scenes import BRAUNSCHWEIG_M, simulated, station_of
 
 PLACE_M = baselines_of(BRAUNSCHWEIG_M, BRAUNSCHWEIG_M[0]).place_m

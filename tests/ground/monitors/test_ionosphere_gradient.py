@@ -39,7 +39,8 @@ from gbas_ground.params import GroundParams
 from gbas_sim.atmosphere.fronts import WedgeFront
 from gbas_sim.atmosphere.troposphere import Troposphere as SimulatedTroposphere
 from gbas_sim.receivers.presets import receiver_preset
-from gbas_sim.world import World, WorldParams, open_orbits
+from gbas_sim.world import World, open_orbits
+from gbas_sim.world_params import WorldParams
 from loop_double_difference import dense, loop_double_differences
 from monitor_scenes import BRAUNSCHWEIG_M, RUNWAY_RAD, recorded_pair, simulated, station_gradient, station_of
 

@@ -32,7 +32,8 @@ from gbas_sim.atmosphere.fronts import WedgeFront
 from gbas_sim.atmosphere.troposphere import Troposphere as SimulatedTroposphere
 from gbas_sim.faults.kinds import ExcessiveAcceleration, LowPower, OrbitFault
 from gbas_sim.receivers.presets import receiver_preset
-from gbas_sim.world import World, WorldParams
+from gbas_sim.world import World
+from gbas_sim.world_params import WorldParams
 from monitor_scenes import BRAUNSCHWEIG_M, RUNWAY_RAD, STATION, simulated, station_gradient, station_of
 
 AIR = Troposphere(refractivity=330.0, scale_height_m=7900.0)

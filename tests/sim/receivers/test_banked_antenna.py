@@ -16,7 +16,8 @@ from gbas_core.signals import FREQUENCY_HZ, L1, L2, L5, SPEED_OF_LIGHT_MPS
 from gbas_sim.flight.dynamics import AIRLINER, Cruise, Flight, FlightPlan, Start, Turn
 from gbas_sim.receivers.presets import receiver_preset
 from gbas_sim.receivers.receiver import AIRBORNE_RECEIVER
-from gbas_sim.world import World, WorldParams
+from gbas_sim.world import World
+from gbas_sim.world_params import WorldParams
 
 SITE = (3840619.039, 715604.228, 5024909.863)
 START = Start(latitude_rad=math.radians(52.5), longitude_rad=math.radians(10.5), height_m=2000.0, heading_rad=0.4)

@@ -20,7 +20,8 @@ from gbas_sim.receivers.oscillators import OSCILLATORS
 from gbas_sim.receivers.receiver_model import IDEAL
 from gbas_sim.receivers.site_scene import Building, SceneParams
 from gbas_sim.scenario import ScenarioError, scenario_from_mapping
-from gbas_sim.world import World, WorldParams
+from gbas_sim.world import World
+from gbas_sim.world_params import WorldParams
 
 SITES = ((3840619.039, 715604.228, 5024909.863), (3840835.113, 714861.969, 5024848.587))
 APPROACH = FinalApproach.from_course(

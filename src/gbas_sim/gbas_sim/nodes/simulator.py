@@ -17,7 +17,8 @@ from gbas_node.params import DriverParams
 from gbas_node.serving import run
 from gbas_sim.params import TroposphereSection
 from gbas_sim.scenario import SECTION, open_world, read_sections, scenario_from_mapping, sim_params
-from gbas_sim.world import SimulatedEpoch, Truth, World
+from gbas_sim.simulated_epochs import SimulatedEpoch, Truth
+from gbas_sim.world import World
 
 ACK_TIMEOUT_S = 10.0
 EPHEMERIS_LEAD_S = 60.0

@@ -35,7 +35,8 @@ from gbas_ground.monitors.ionosphere_gradient import (
     gradient_site,
 )
 from gbas_ground.params import GroundParams
-from gbas_sim.world import WorldParams, open_orbits
+from gbas_sim.world import open_orbits
+from gbas_sim.world_params import WorldParams
 
 DAY_S: Final = 86_400.0
 BINS_DEG: Final = (5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 45.0, 60.0, 90.0)

@@ -37,7 +37,8 @@ from gbas_sim.atmosphere.troposphere import Troposphere
 from gbas_sim.faults.fault_base import Moment, SignalEffect
 from gbas_sim.faults.signal_faults import CodeCarrierDivergence
 from gbas_sim.receivers.presets import receiver_preset
-from gbas_sim.world import World, WorldParams
+from gbas_sim.world import World
+from gbas_sim.world_params import WorldParams
 from gbas_studies.ccd.monitors import TAU_S
 from gbas_studies.ccd.recorded import MonitoredSeries, Observer, monitor_epochs
 

@@ -30,7 +30,7 @@ from gbas_sim.faults.kinds import (
     OrbitFault,
     RangeFault,
 )
-from gbas_sim.world import WorldParams
+from gbas_sim.world_params import WorldParams
 from gbas_studies.ccd.monitors import cmc_rate
 from gbas_studies.ccd.smoothed_error import Smoothing, StudyError
 from gbas_studies.faults.exposure import TIME_TO_ALERT_S, divergence_limit_s, extrapolation_limit_s

@@ -23,7 +23,8 @@ from gbas_msgs_py.joining import ReceptionQueue
 from gbas_msgs_py.products import L1_100
 from gbas_sim.atmosphere.fronts import PlasmaBubble, WedgeFront
 from gbas_sim.faults.kinds import ReceiverFault, SatelliteFault
-from gbas_sim.world import World, WorldParams
+from gbas_sim.world import World
+from gbas_sim.world_params import WorldParams
 from gbas_vdb.messages.types import Type1, Type11
 from gbas_vdb.transmission.burst import SLOT_DURATION_S, Burst
 from gbas_vdb.transmission.receive import decode_burst

@@ -24,7 +24,7 @@ from gbas_core.satellites import SAT_IDS
 from gbas_ground.ionosphere.threat import FrontThreat
 from gbas_ground.params import GroundParams
 from gbas_sim.atmosphere.fronts import WedgeFront
-from gbas_sim.world import WorldParams
+from gbas_sim.world_params import WorldParams
 from gbas_studies.fronts.quiet import Flight, Observed, fly, observe
 from gbas_studies.fronts.response import RangeErrors, range_errors, respond
 

@@ -22,7 +22,9 @@ from gbas_msgs_py.codes import ServiceType
 from gbas_msgs_py.products import L1_100
 from gbas_sim.atmosphere.fronts import WedgeFront
 from gbas_sim.atmosphere.paths import SignalPaths
-from gbas_sim.world import SimulatedEpoch, World, WorldParams
+from gbas_sim.simulated_epochs import SimulatedEpoch
+from gbas_sim.world import World
+from gbas_sim.world_params import WorldParams
 
 _SCALARS: Final = ("vpl_m", "lpl_m", "val_m", "lal_m", "service", "alert")
 
