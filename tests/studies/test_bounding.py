@@ -10,19 +10,8 @@ from scipy.stats import binomtest
 from gbas_core.positioning.wls import projection_matrix, vertical_lateral
 from gbas_core.satellites import CLOCK_GROUPS, N_SATS
 from gbas_msgs_py.records import SolutionEpoch
-from gbas_studies.bounding import (
-    BoundingReport,
-    ErrorSeries,
-    bounding_report,
-    error_series,
-    measured_sigma,
-)
-from gbas_studies.exceedances import (
-    StanfordCounts,
-    correlation_time_s,
-    interval,
-    stanford_counts,
-)
+from gbas_studies.bounding import BoundingReport, ErrorSeries, bounding_report, error_series, measured_sigma
+from gbas_studies.exceedances import StanfordCounts, correlation_time_s, interval, stanford_counts
 
 EPOCHS, TAU_S = 1800, 10.0
 SEEDS = 20

@@ -12,14 +12,8 @@ from mcap.stream_reader import StreamReader
 from rosbags.highlevel import AnyReader
 
 from gbas_bags.bags import METADATA_FILE, bag_files
-from gbas_bags.check_contents import (
-    Contents,
-)
-from gbas_bags.problems import (
-    CheckResult,
-    Problem,
-    text_of,
-)
+from gbas_bags.check_contents import Contents
+from gbas_bags.problems import CheckResult, Problem, text_of
 
 
 def check(path: Path) -> CheckResult:

@@ -17,11 +17,7 @@ from rosbags.typesys.store import Typestore
 
 from gbas_bags import epochs
 from gbas_bags.mcap_scan import McapScan, Message
-from gbas_bags.problems import (
-    CheckResult,
-    Problem,
-    text_of,
-)
+from gbas_bags.problems import CheckResult, Problem, text_of
 from gbas_bags.topic_names import contract_name, is_ephemeris, is_observation, is_progress, split
 from gbas_bags.versions import older_tables, older_text, table_identifier, version_read
 from gbas_core.gnss.gpstime import calendar_text, epoch_key, from_epoch_key

@@ -10,10 +10,7 @@ from typing import Any, Final
 
 import yaml
 
-from gbas_bags.bags import (
-    END_METADATA,
-    BagReader,
-)
+from gbas_bags.bags import END_METADATA, BagReader
 from gbas_bags.mcap_log import BagWriter, Topic
 from gbas_bags.mcap_scan import Channel, Damage, Message
 from gbas_core.errors import BagError

@@ -14,11 +14,7 @@ import rclpy
 import rclpy.utilities
 from rclpy.signals import SignalHandlerOptions
 
-from gbas_node.node import (
-    EXIT_OK,
-    POLL_S,
-    GbasNode,
-)
+from gbas_node.node import EXIT_OK, POLL_S, GbasNode
 from gbas_node.transport import use_profile
 
 Factory = Callable[[], "GbasNode"]

@@ -10,12 +10,8 @@ from numpy.typing import NDArray
 
 from gbas_core.satellites import SAT_INDEX
 from gbas_sim.atmosphere.fronts import WedgeFront
-from gbas_sim.faults.kinds import (
-    ReceiverFault,
-)
-from gbas_sim.world_params import (
-    WorldParams,
-)
+from gbas_sim.faults.kinds import ReceiverFault
+from gbas_sim.world_params import WorldParams
 
 AboveMasks = Callable[[int], NDArray[np.bool_]]
 """Satellites above the receivers' masks at an epoch, ``(R, N_SATS)``, by its number."""

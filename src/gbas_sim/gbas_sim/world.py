@@ -24,28 +24,16 @@ from gbas_core.satellites import N_SATS, satellites_of
 from gbas_core.signals import L2, N_BANDS
 from gbas_sim.atmosphere.ionosphere import Ionosphere
 from gbas_sim.atmosphere.paths import Delay, SignalPaths
-from gbas_sim.faults.kinds import (
-    FrozenOutput,
-    SatelliteFault,
-    source_epochs,
-    with_wrong_broadcasts,
-)
+from gbas_sim.faults.kinds import FrozenOutput, SatelliteFault, source_epochs, with_wrong_broadcasts
 from gbas_sim.instants import Instant, Instants
 from gbas_sim.receivers.arcs import Breaks, Passes, arc_numbers
 from gbas_sim.receivers.oscillators import ClockState
 from gbas_sim.receivers.receiver import Arrivals
 from gbas_sim.satellites.broadcast import Orbits, almanac_orbits, nominal_orbits, recorded_orbits
 from gbas_sim.satellites.sightlines import sightlines
-from gbas_sim.simulated_epochs import (
-    SimulatedEpoch,
-    Truth,
-)
-from gbas_sim.threat_checks import (
-    check_threats,
-)
-from gbas_sim.world_params import (
-    WorldParams,
-)
+from gbas_sim.simulated_epochs import SimulatedEpoch, Truth
+from gbas_sim.threat_checks import check_threats
+from gbas_sim.world_params import WorldParams
 
 _PASSES_S: Final = 300.0
 """Satellites that set for less may be found with the carrier they had."""

@@ -15,11 +15,7 @@ from gbas_sim.atmosphere.ionosphere import IonosphereParams
 from gbas_sim.atmosphere.paths import Station
 from gbas_sim.atmosphere.scintillation import ScintillationParams
 from gbas_sim.atmosphere.troposphere import Troposphere, WeatherBox
-from gbas_sim.faults.kinds import (
-    RECEIVERS,
-    ReceiverFault,
-    SatelliteFault,
-)
+from gbas_sim.faults.kinds import RECEIVERS, ReceiverFault, SatelliteFault
 from gbas_sim.receivers.receiver import AIRBORNE_RECEIVER, GROUND_RECEIVER, ReceiverParams
 from gbas_sim.receivers.receiver_model import ReceiverModel
 from gbas_sim.receivers.site_scene import Building, SceneParams

@@ -23,13 +23,7 @@ from gbas_core.gnss.gpstime import epoch_key
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import CLOCK_GROUPS
 from gbas_msgs_py.records import SolutionEpoch
-from gbas_studies.exceedances import (
-    Exceedance,
-    StanfordCounts,
-    correlation_time_s,
-    exceedance,
-    stanford_counts,
-)
+from gbas_studies.exceedances import Exceedance, StanfordCounts, correlation_time_s, exceedance, stanford_counts
 
 ELEVATION_EDGES_DEG: Final = (0.0, 15.0, 25.0, 40.0, 60.0, 90.0)
 """Sigma is measured in these ranges of elevation."""

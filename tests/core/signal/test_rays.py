@@ -10,13 +10,7 @@ import pytest
 from gbas_core.satellites import N_SATS
 from gbas_core.signal.antenna import ANTENNAS, AntennaPattern
 from gbas_core.signal.rays import Scene, ray_errors
-from gbas_core.signal.surfaces import (
-    MATERIALS,
-    Facet,
-    box,
-    circular_reflection,
-    mesh_facets,
-)
+from gbas_core.signal.surfaces import MATERIALS, Facet, box, circular_reflection, mesh_facets
 from gbas_core.signals import FREQUENCY_HZ, L1, L2, L5, WAVELENGTH_M
 
 # As strong in both polarisations from everywhere: what reflects is all that makes a difference.

@@ -8,10 +8,7 @@ import pytest
 from gbas_core.gnss.frames import geodetic_from_ecef, rot_enu_ecef
 from gbas_core.satellites import SAT_INDEX
 from gbas_core.signals import L1, L5
-from gbas_ground.monitors.carrier_acceleration import (
-    carrier_acceleration_step,
-    initial_carrier_acceleration,
-)
+from gbas_ground.monitors.carrier_acceleration import carrier_acceleration_step, initial_carrier_acceleration
 from gbas_ground.monitors.double_difference import (
     Troposphere,
     carrier_residual_m,
@@ -23,10 +20,7 @@ from gbas_ground.monitors.ephemeris_residual import (
     initial_ephemeris_residual,
     site_decorrelation,
 )
-from gbas_ground.monitors.expected_power import (
-    initial_power_expectation,
-    power_expectation_step,
-)
+from gbas_ground.monitors.expected_power import initial_power_expectation, power_expectation_step
 from gbas_ground.monitors.ionosphere_gradient import check_ionosphere_gradient, gradient_site
 from gbas_sim.atmosphere.fronts import WedgeFront
 from gbas_sim.atmosphere.troposphere import Troposphere as SimulatedTroposphere

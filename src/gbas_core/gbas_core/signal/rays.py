@@ -23,12 +23,7 @@ from gbas_core.parameters import Parameter, parameters
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.signal.antenna import AntennaPattern
 from gbas_core.signal.discriminator import discriminator_errors
-from gbas_core.signal.surfaces import (
-    MATERIALS,
-    ComplexArray,
-    Facet,
-    circular_reflection,
-)
+from gbas_core.signal.surfaces import MATERIALS, ComplexArray, Facet, circular_reflection
 from gbas_core.signal.tracking_loops import MODULATIONS, SIGNALS, per_signal
 from gbas_core.signals import FREQUENCY_HZ, L1, L5, N_BANDS, WAVELENGTH_M
 

@@ -16,12 +16,7 @@ from gbas_core.parameters import Parameter, parameters
 from gbas_core.record import FloatArray
 from gbas_core.signal.antenna import ANTENNAS
 from gbas_core.signal.rays import RayErrors, Scene, ray_errors
-from gbas_core.signal.surfaces import (
-    MATERIAL,
-    MATERIALS,
-    Facet,
-    box,
-)
+from gbas_core.signal.surfaces import MATERIAL, MATERIALS, Facet, box
 from gbas_sim.atmosphere.paths import SignalPaths, Station
 from gbas_sim.faults.fault_base import SignalEffect
 

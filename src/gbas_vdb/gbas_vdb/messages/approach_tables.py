@@ -9,25 +9,10 @@ import math
 from fractions import Fraction
 from typing import Final
 
-from gbas_vdb.messages.fields import (
-    Choice,
-    Letter,
-    Number,
-    Spare,
-    Switch,
-    Text,
-)
+from gbas_vdb.messages.fields import Choice, Letter, Number, Spare, Switch, Text
 from gbas_vdb.messages.layout import Layout, Part
-from gbas_vdb.messages.tables import (
-    ANGLE,
-    COUNTS_PER_DEGREE,
-    latitude,
-    longitude,
-)
-from gbas_vdb.messages.types import (
-    FasBlock,
-    FasDataSet,
-)
+from gbas_vdb.messages.tables import ANGLE, COUNTS_PER_DEGREE, latitude, longitude
+from gbas_vdb.messages.types import FasBlock, FasDataSet
 
 
 def _fpap_offset(name: str) -> Number:

@@ -26,22 +26,8 @@ from gbas_vdb.errors import VdbError
 from gbas_vdb.messages import approach_tables, tables
 from gbas_vdb.messages import types as m
 from gbas_vdb.messages.block import BlockError, MessageBlock, decode_blocks, encode_block, message_type_of
-from gbas_vdb.messages.fields import (
-    Choice,
-    Count,
-    Letter,
-    Number,
-    Spare,
-    Switch,
-    Text,
-    Vector,
-)
-from gbas_vdb.messages.layout import (
-    Entry,
-    Group,
-    Layout,
-    Part,
-)
+from gbas_vdb.messages.fields import Choice, Count, Letter, Number, Spare, Switch, Text, Vector
+from gbas_vdb.messages.layout import Entry, Group, Layout, Part
 
 Document = dict[str, Any]
 

@@ -14,17 +14,7 @@ from typing import Any
 
 from gbas_vdb.coding.bits import BitReader, BitWriter
 from gbas_vdb.errors import FieldError, VdbError
-from gbas_vdb.messages.fields import (
-    Choice,
-    Count,
-    Letter,
-    Number,
-    Spare,
-    Switch,
-    Text,
-    Vector,
-    is_missing,
-)
+from gbas_vdb.messages.fields import Choice, Count, Letter, Number, Spare, Switch, Text, Vector, is_missing
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,14 +10,7 @@ import math
 from fractions import Fraction
 from typing import Final
 
-from gbas_vdb.messages.fields import (
-    Choice,
-    Count,
-    Number,
-    Spare,
-    Text,
-    Vector,
-)
+from gbas_vdb.messages.fields import Choice, Count, Number, Spare, Text, Vector
 from gbas_vdb.messages.layout import Group, Layout
 from gbas_vdb.messages.types import (
     AdditionalBlock1,

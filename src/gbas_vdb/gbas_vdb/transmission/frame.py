@@ -11,14 +11,7 @@ from dataclasses import dataclass, field
 
 from gbas_vdb.errors import ScheduleError
 from gbas_vdb.messages import tables
-from gbas_vdb.messages.types import (
-    Correction30,
-    Correction100,
-    FasDataSet,
-    Type2,
-    Type5,
-    UnknownDataSet,
-)
+from gbas_vdb.messages.types import Correction30, Correction100, FasDataSet, Type2, Type5, UnknownDataSet
 from gbas_vdb.transmission.rotation import SourceHistory
 
 

@@ -19,25 +19,9 @@ from gbas_vdb.coding.fec import MAX_APPLICATION_BYTES, encode_fec
 from gbas_vdb.errors import ScheduleError
 from gbas_vdb.messages import tables
 from gbas_vdb.messages.block import CRC_BYTES, HEADER_BYTES, MAX_BLOCK_BYTES, encode_block, encode_body, wrap_body
-from gbas_vdb.messages.types import (
-    Correction30,
-    FasDataSet,
-    Type1,
-    Type2,
-    Type3,
-    Type4,
-    Type5,
-    Type11,
-    UnknownDataSet,
-)
+from gbas_vdb.messages.types import Correction30, FasDataSet, Type1, Type2, Type3, Type4, Type5, Type11, UnknownDataSet
 from gbas_vdb.transmission.burst import SLOT_NAMES, Burst
-from gbas_vdb.transmission.frame import (
-    Frame,
-    ItemHistory,
-    ScheduleParams,
-    ScheduleState,
-    SourceCorrection,
-)
+from gbas_vdb.transmission.frame import Frame, ItemHistory, ScheduleParams, ScheduleState, SourceCorrection
 from gbas_vdb.transmission.rotation import SourceHistory, choose_first
 
 _WRAPPER_BYTES: Final = HEADER_BYTES + CRC_BYTES
