@@ -159,7 +159,8 @@ def test_signal_during_the_start_ends_the_program(launcher: Any, probe: Any) -> 
 
 SIGNALLED_EARLY = """
 import os, signal, time
-from gbas_node.node import GbasNode, serve
+from gbas_node.node import GbasNode
+from gbas_node.serving import serve
 
 class Early(GbasNode):
     def __init__(self):

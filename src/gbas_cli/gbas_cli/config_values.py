@@ -105,7 +105,7 @@ def _sections_only(configuration: Configuration) -> Effective:
         try:
             params = section.make({each: _mapping(sections, each, path) for each in section.reads}, str(path))
         except ParameterError as error:
-            if " is missing" not in str(error):
+            if not error.missing:
                 raise
             lacking.append(f"{name}: {str(error).removeprefix(f'{path}: ')}")
             shown = _as_far_as_given(section, _mapping(sections, name, path))

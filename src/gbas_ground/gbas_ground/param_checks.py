@@ -113,7 +113,8 @@ def _check_orbit_claim(params: GroundParams) -> None:
         if claims.external_monitor:
             if value == 0.0:
                 raise ParameterError(
-                    f"{key} is missing: what ephemeris.external_monitor = {claims.external_monitor!r} supports"
+                    f"{key} is missing: what ephemeris.external_monitor = {claims.external_monitor!r} supports",
+                    missing=True,
                 )
         elif value > 0.0:
             excludes = params.ephemeris_residual.exclude

@@ -90,7 +90,7 @@ def _approaches(given: Any) -> Any:
                 trusted_path_point(section.arinc424)
             encode_body(Type4(data_sets=(fas_data_set(approach),)))
         except ValueError as error:
-            raise ParameterError(f"{name}: {error}") from None
+            raise ParameterError.at(f"{name}: ", error) from None
         approaches.append(approach)
     return tuple(approaches)
 

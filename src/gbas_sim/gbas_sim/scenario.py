@@ -125,7 +125,7 @@ def open_world(params: WorldParams, *, source: str = "parameters") -> World:
     try:
         return World(params)
     except (AlmanacError, RinexError, ValueError) as error:
-        raise ScenarioError(f"{source}: {error}") from None
+        raise ScenarioError.at(f"{source}: ", error) from None
 
 
 def read_sections(path: str | Path) -> dict[str, Any]:
@@ -156,7 +156,7 @@ def sim_params(mapping: Mapping[str, Any], *, source: str = "parameters") -> Sim
     try:
         return from_mapping(SimParams, _section(nested(mapping), SECTION), section=SECTION)
     except ParameterError as error:
-        raise ScenarioError(f"{source}: {error}") from None
+        raise ScenarioError.at(f"{source}: ", error) from None
 
 
 def scenario_from_mapping(mapping: Mapping[str, Any], *, source: str = "parameters") -> WorldParams:
@@ -172,7 +172,7 @@ def scenario_from_mapping(mapping: Mapping[str, Any], *, source: str = "paramete
     try:
         return _world(_section(sections, "ground"), sim)
     except ValueError as error:
-        raise ScenarioError(f"{source}: {error}") from None
+        raise ScenarioError.at(f"{source}: ", error) from None
 
 
 def _section(sections: Mapping[str, Any], name: str, path: str = "") -> dict[str, Any]:
@@ -187,7 +187,7 @@ def _section(sections: Mapping[str, Any], name: str, path: str = "") -> dict[str
 
 def _world(ground: dict[str, Any], sim: SimParams) -> WorldParams:
     if not ground:
-        raise ParameterError("section 'ground' is missing: there is no site")
+        raise ParameterError("section 'ground' is missing: there is no site", missing=True)
     return WorldParams(
         **{item.name: getattr(sim, item.name) for item in fields(RunParams)},
         **vars(sim.constellation),
@@ -226,9 +226,9 @@ def _approach(ground: Mapping[str, Any], name: str | None) -> FinalApproach:
     approaches = _section(ground, "approaches", "ground.")
     names = sorted(approaches)
     if not names:
-        raise ParameterError("ground.approaches is missing: there is nothing to fly")
+        raise ParameterError("ground.approaches is missing: there is nothing to fly", missing=True)
     if name is None and len(names) > 1:
-        raise ParameterError(f"sim.approach is missing; the station has {', '.join(names)}")
+        raise ParameterError(f"sim.approach is missing; the station has {', '.join(names)}", missing=True)
     if name is not None and name not in names:
         raise ParameterError(f"sim.approach = {name!r} is not one of {', '.join(names)}")
     chosen = name or names[0]
@@ -236,7 +236,7 @@ def _approach(ground: Mapping[str, Any], name: str | None) -> FinalApproach:
     try:
         return approach_from_mapping(section)
     except ValueError as error:
-        raise ParameterError(f"ground.approaches.{chosen}: {error}") from None
+        raise ParameterError.at(f"ground.approaches.{chosen}: ", error) from None
 
 
 def _flight(sim: SimParams, ground: Mapping[str, Any]) -> FlightPath:
@@ -246,7 +246,7 @@ def _flight(sim: SimParams, ground: Mapping[str, Any]) -> FlightPath:
     try:
         return flight_of(flight, approach)
     except ValueError as error:
-        raise ParameterError(f"sim.{error}") from None
+        raise ParameterError.at("sim.", error) from None
 
 
 def _troposphere(ground: Mapping[str, Any], sim: SimParams) -> Troposphere:
@@ -266,7 +266,7 @@ def _receiver(name: str, sim: SimParams) -> ReceiverParams | ReceiverModel:
     try:
         return preset_receiver(receiver, interval_s=sim.interval_s)
     except ValueError as error:
-        raise ParameterError(f"sim.{name}: {error}") from None
+        raise ParameterError.at(f"sim.{name}: ", error) from None
 
 
 def _threats(sim: SimParams) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Final, Protocol, runtime_checkable
 from numpy.typing import ArrayLike
 from pydantic import BeforeValidator, InstanceOf
 
-from gbas_core.parameters import Parameter, parameters
+from gbas_core.parameters import Parameter, ParameterError, parameters
 from gbas_core.record import FloatArray
 from gbas_sim.atmosphere.fronts import PlasmaBubble, WedgeFront
 from gbas_sim.atmosphere.ionosphere import IonosphereParams
@@ -141,7 +141,7 @@ class WorldParams(RunParams, ConstellationParams):
 
     def _check_duration(self) -> None:
         if self.flight is None and self.duration_s is None:
-            raise ValueError("world: duration_s is missing, and there is no flight to take it from")
+            raise ParameterError("world: duration_s is missing, and there is no flight to take it from", missing=True)
         if self.duration_s is not None and self.flight is not None and self.duration_s > self.flight.duration_s:
             longest = self.flight.duration_s
             raise ValueError(f"world: duration_s = {self.duration_s:g} is longer than the flight, {longest:g}")

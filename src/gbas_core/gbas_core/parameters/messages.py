@@ -6,14 +6,23 @@ import dataclasses
 import difflib
 import re
 from collections.abc import Iterable, Mapping
-from typing import Any, Final
+from typing import Any, Final, Self
 
 from pydantic import ValidationError
 from pydantic.dataclasses import is_pydantic_dataclass
 
 from gbas_core.errors import GbasError
 from gbas_core.parameters.declaration import OUT_OF_BOUNDS, UNKNOWN
-from gbas_core.parameters.structure import default_of, field_of, file_key, hints_of, keys_of, parameter_of, place_of
+from gbas_core.parameters.structure import (
+    default_of,
+    field_of,
+    file_key,
+    hints_of,
+    is_in_collection,
+    keys_of,
+    parameter_of,
+    place_of,
+)
 
 _KINDS: Final = {
     "float_type": "is not a number",
@@ -36,7 +45,23 @@ _MISSING: Final = ("missing", "missing_keyword_only_argument", "missing_argument
 
 
 class ParameterError(GbasError, ValueError):
-    """A parameter that is unknown, missing, of the wrong kind or out of bounds; the text names it and its value."""
+    """A parameter that is unknown, missing, of the wrong kind or out of bounds; the text names it and its value.
+
+    Attributes
+    ----------
+    missing : bool
+        Nothing is wrong with what is given; a key is lacking that another file may add. A named or numbered section
+        that is given stands in one file: what is lacking in it is wrong.
+    """
+
+    def __init__(self, text: str, *, missing: bool = False) -> None:
+        super().__init__(text)
+        self.missing = missing
+
+    @classmethod
+    def at(cls, where: str, error: Exception) -> Self:
+        """The same problem, told with where it is."""
+        return cls(f"{where}{error}", missing=getattr(error, "missing", False))
 
 
 def unknown_parameters(names: Iterable[str], known: Iterable[str]) -> None:
@@ -61,13 +86,16 @@ def explained(kind: type[Any], error: ValidationError, section: str = "") -> Par
         name = str(loc[-1])
         return ParameterError(f"{'.'.join((*key.split('.')[:-1], name))} is unknown{nearest_name(name, known)}")
     if reason in _MISSING:
-        return ParameterError(_missing(hints_of(place_of(kind, loc[:-1])[1]).get(field_of(str(loc[-1]))), key))
+        hint = hints_of(place_of(kind, loc[:-1])[1]).get(field_of(str(loc[-1])))
+        return ParameterError(_missing(hint, key), missing=not is_in_collection(kind, loc))
     if reason == OUT_OF_BOUNDS:
         return ParameterError(f"{key} = {found['msg']}")
     if reason in ("value_error", "assertion_error"):
-        return ParameterError(_below(there, key, str(found["ctx"]["error"])))
+        cause = found["ctx"]["error"]
+        missing = getattr(cause, "missing", False) and not is_in_collection(kind, loc)
+        return ParameterError(_below(there, key, str(cause)), missing=missing)
     if reason in _TAGS:
-        return _of_no_kind(key, value, found["ctx"])
+        return _of_no_kind(key, value, found["ctx"], missing=not is_in_collection(kind, loc))
     if reason == "literal_error":
         return ParameterError(f"{key} = {value!r} is not one of {found['ctx']['expected'].replace(' or ', ', ')}")
     return ParameterError(f"{key} = {value!r} {_KINDS.get(reason, found['msg'])}")
@@ -98,13 +126,13 @@ def _below(there: Any, key: str, text: str) -> str:
     return f"{key}.{text}" if not is_section or first in keys_of(there) else f"{key}: {text}"
 
 
-def _of_no_kind(key: str, value: Any, context: Mapping[str, Any]) -> ParameterError:
+def _of_no_kind(key: str, value: Any, context: Mapping[str, Any], *, missing: bool) -> ParameterError:
     """The key that tells the kind of a section is missing, or its value unknown."""
     if not isinstance(value, Mapping):
         return ParameterError(f"{key} = {value!r} is not a section of keys")
     teller = f"{key}.{context['discriminator'].strip(chr(39))}"
     if "tag" not in context:
-        return ParameterError(f"{teller} is missing")
+        return ParameterError(f"{teller} is missing", missing=missing)
     known = context["expected_tags"].replace("'", "")
     return ParameterError(f"{teller} = {context['tag']!r} is not one of {known}")
 

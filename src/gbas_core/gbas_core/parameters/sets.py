@@ -68,7 +68,7 @@ def from_mapping(kind: type[P], mapping: Mapping[str, Any], *, source: str = "",
         found: P = adapter_of(kind).validate_python(nested(mapping), by_alias=True, by_name=False, context=_FROM_FILE)
     except (ValidationError, ParameterError) as error:
         problem = explained(kind, error, section) if isinstance(error, ValidationError) else error
-        raise ParameterError(f"{source}: {problem}" if source else str(problem)) from None
+        raise ParameterError.at(f"{source}: " if source else "", problem) from None
     return found
 
 

@@ -73,6 +73,12 @@ def place_of(kind: Any, loc: tuple[int | str, ...]) -> tuple[list[str], Any]:
     return keys, bare_type(kind)
 
 
+def is_in_collection(kind: Any, loc: tuple[int | str, ...]) -> bool:
+    """Whether a place of pydantic's is within a section that has a name or a number among others."""
+    above = (place_of(kind, loc[:length])[1] for length in range(len(loc)))
+    return any(typing.get_origin(each) in (dict, tuple) for each in above)
+
+
 def bare_type(hint: Any) -> Any:
     """A type without its annotations and without None."""
     if hasattr(hint, "__metadata__"):

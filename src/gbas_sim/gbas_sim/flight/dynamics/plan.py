@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from gbas_core.parameters import Parameter, parameters
+from gbas_core.parameters import Parameter, ParameterError, parameters
 from gbas_core.positioning.approach import FinalApproach
 from gbas_sim.flight.dynamics.segments import SPEED, Approach, Configuration, MissedApproach, Segment
 
@@ -55,7 +55,9 @@ class FlightPlan:
         if approaches and self.start is not None:
             raise ValueError("plan: start is given, but the flight is laid out from its approach")
         if not approaches and self.start is None:
-            raise ValueError("plan: start is missing (without an approach the flight must begin somewhere)")
+            raise ParameterError(
+                "plan: start is missing (without an approach the flight must begin somewhere)", missing=True
+            )
 
     @property
     def anchor(self) -> int | None:
