@@ -299,6 +299,37 @@ def test_shipped_files_are_read_as_a_run_reads_them(path: Path) -> None:
     assert not any(each.source == str(path) and each.declared.value is None for each in found.values["ground"])
 
 
+def test_the_simulated_air_is_the_stations_unless_it_is_given(tmp_path: Path) -> None:
+    shipped = effective(config_path("short_approach.yaml"))
+    ground, sim = sources(shipped, "ground"), sources(shipped, "sim")
+    for key, taken in (
+        ("refractivity", "atmosphere.refractivity"),
+        ("scale_height_m", "atmosphere.scale_height_m"),
+        ("reference_height_m", "station.height_m"),
+    ):
+        assert sim[f"troposphere.{key}"] == ground[taken]
+        assert sim[f"troposphere.{key}"][1] == "braunschweig.yaml"
+    own = {
+        "base": str(config_path("short_approach.yaml")),
+        "/**": {"ros__parameters": {"sim": {"troposphere": {"refractivity": 7.0}}}},
+    }
+    (tmp_path / "own.yaml").write_text(yaml.safe_dump(own))
+    found = sources(effective(tmp_path / "own.yaml"), "sim")
+    assert found["troposphere.refractivity"] == (7.0, "own.yaml")
+    assert found["troposphere.scale_height_m"] == sim["troposphere.scale_height_m"]
+
+
+def test_a_plain_section_above_a_wrapped_base_is_told_its_place(tmp_path: Path) -> None:
+    plain = {"base": str(config_path("short_approach.yaml")), "sim": {"seed": 3}}
+    (tmp_path / "plain.yaml").write_text(yaml.safe_dump(plain))
+    done = gbas("check", str(tmp_path / "plain.yaml"))
+    assert done.exit_code == 2
+    assert done.stderr == (
+        f"gbas: {tmp_path / 'plain.yaml'}: sim: stands at the top of the file, where nodes do not read it; "
+        "put it below '/**: ros__parameters:'\n"
+    )
+
+
 def test_files_named_by_nodes_are_read_and_nodes_may_differ(tmp_path: Path) -> None:
     (tmp_path / "fleet.yaml").write_text("airborne: {aad: B, settle_s: 100, elevation_mask_deg: 7}\n")
     named = {"config": str(tmp_path / "fleet.yaml")}

@@ -28,6 +28,7 @@ from gbas_msgs_py.topics import DEFAULT_NAMESPACE
 
 _PARAMETERS: Final = "ros__parameters"
 _ALL: Final = "/**"
+_SECTIONS: Final = {kind.needs for kind in NODE_KINDS.values() if kind.needs}
 MODELINE: Final = "# yaml-language-server:"
 """Begin of the comment that tells editors the schema of a file."""
 
@@ -107,6 +108,9 @@ def read_run_config(path: Path) -> RunConfig:
     if len(configuration.layers) > 1:
         document = configuration.content()
         whole = _heading(path) + yaml.safe_dump(document, sort_keys=False, width=120)
+    if plain := [name for name in document if name in _SECTIONS]:
+        where = f"below '{_ALL}: {_PARAMETERS}:'"
+        raise ConfigError(path, f"stands at the top of the file, where nodes do not read it; put it {where}", plain[0])
     parameters = dict(named_sections(document, path))
     nodes = {node.full_name: node for node in _named(parameters, path)}
     for node in _implied(parameters, has_driver=any(n.kind.stage is Stage.DRIVER for n in nodes.values())):

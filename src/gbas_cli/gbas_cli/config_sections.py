@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 from gbas_airborne.params import AirborneParams
@@ -14,6 +14,7 @@ from gbas_core.positioning.approach_keys import ApproachSection
 from gbas_ground.params import GroundParams
 from gbas_sim.params import SimParams
 from gbas_sim.scenario import open_world, scenario_from_mapping, sim_params
+from gbas_sim.world_params import WorldParams
 
 Sections = Mapping[str, Mapping[str, Any]]
 
@@ -34,6 +35,8 @@ class Section:
         Classes under :func:`gbas_core.parameters.parameters` it consists of, the section's own first.
     start : callable
         What a run does with the parameters at its start, as far as that may be refused.
+    taken : mapping
+        Keys that have the value of another section's key as long as they are not given.
     """
 
     reads: tuple[str, ...]
@@ -41,6 +44,7 @@ class Section:
     shown: Callable[[Any, Sections], Iterable[Declared]]
     models: tuple[type[Any], ...] = ()
     start: Callable[[Any, str], Any] = lambda params, source: None
+    taken: Mapping[str, str] = field(default_factory=dict)
 
     def schema(self) -> dict[str, Any]:
         """JSON Schema of the section as it stands in a file."""
@@ -53,6 +57,19 @@ def _ground_shown(station: GroundParams, sections: Sections) -> Iterator[Declare
         approach = from_mapping(ApproachSection, keys)
         yield from (each for each in declared(approach, f"approaches.{name}.") if each.value is not None)
 
+
+def _sim_shown(world: WorldParams, sections: Sections) -> Iterator[Declared]:
+    """The troposphere that is left out is the station's."""
+    for each in declared(sim_params(sections)):
+        of_station = each.key in _STATION_AIR and each.value is None
+        yield replace(each, value=getattr(world.troposphere, each.key.rpartition(".")[2])) if of_station else each
+
+
+_STATION_AIR: Final = {
+    "troposphere.refractivity": "ground.atmosphere.refractivity",
+    "troposphere.scale_height_m": "ground.atmosphere.scale_height_m",
+    "troposphere.reference_height_m": "ground.station.height_m",
+}
 
 SECTIONS: Final[dict[str, Section]] = {
     "ground": Section(
@@ -70,9 +87,10 @@ SECTIONS: Final[dict[str, Section]] = {
     "sim": Section(
         reads=("ground", "sim"),
         make=lambda sections, source: scenario_from_mapping(sections, source=source),
-        shown=lambda _, sections: declared(sim_params(sections)),
+        shown=_sim_shown,
         models=(SimParams,),
         start=lambda world, source: open_world(world, source=source),
+        taken=_STATION_AIR,
     ),
 }
 """Every section of the suite; what reads, shows, checks and describes configurations goes through this table."""

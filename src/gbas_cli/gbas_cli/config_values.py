@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import MISSING, dataclass, replace
-from functools import reduce
+from functools import partial, reduce
 from pathlib import Path
 from typing import Any, Final
 
@@ -111,9 +111,7 @@ def _sections_only(configuration: Configuration) -> Effective:
             shown = _as_far_as_given(section, _mapping(sections, name, path))
         else:
             shown = section.shown(params, sections)
-        values[name] = tuple(
-            Value(declared=each, source=_origin(configuration, f"{name}.{each.key}")) for each in shown
-        )
+        values[name] = tuple(_sourced(name, each, partial(_origin, configuration)) for each in shown)
     return Effective(path=path, files=configuration.files, nodes=(), values=values, lacking=tuple(lacking))
 
 
@@ -124,6 +122,12 @@ def _as_far_as_given(section: Section, given: Mapping[str, Any]) -> Iterator[Dec
             yield replace(each, value=_at(given, each.key))
         elif each.value is not MISSING:
             yield each
+
+
+def _sourced(name: str, item: Declared, origin: Callable[[str], str]) -> Value:
+    """A value of a section with where it came from, be it another section's key."""
+    source, other = origin(f"{name}.{item.key}"), SECTIONS[name].taken.get(item.key)
+    return Value(declared=item, source=origin(other) if source == DEFAULT and other is not None else source)
 
 
 def _mapping(sections: Mapping[str, Any], name: str, path: Path) -> Mapping[str, Any]:
@@ -202,10 +206,8 @@ class _Run:
         params = section.make(sections, source)
         if self.start:
             section.start(params, source)
-        return tuple(
-            Value(declared=each, source=self.origin(node, f"{name}.{each.key}", file))
-            for each in section.shown(params, sections)
-        )
+        origin = partial(self.origin, node, config=file)
+        return tuple(_sourced(name, each, origin) for each in section.shown(params, sections))
 
     def sections_of(self, file: str, name: str) -> dict[str, Any]:
         """Sections of a file named by ``config``."""
