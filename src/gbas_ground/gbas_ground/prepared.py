@@ -15,6 +15,7 @@ from gbas_ground.channels.predicted_ranges import Site, site_of
 from gbas_ground.channels.tracking import filter_params
 from gbas_ground.claims.limits import MAX_DECORRELATION
 from gbas_ground.claims.orbit_claim import OrbitSite, orbit_bound
+from gbas_ground.ionosphere.places import Places, places_of
 from gbas_ground.monitors.carrier_acceleration import CarrierAccelerationParams
 from gbas_ground.monitors.ccd import CcdParams
 from gbas_ground.monitors.ccd_f import TwoFrequencyParams
@@ -70,6 +71,11 @@ class PreparedStation:
         params = self.params
         given = params.station_message(), params.approach_messages(), params.schedule()
         return FrameSettings(*given, room=sources_that_fit(*given))
+
+    @cached_property
+    def places(self) -> Places | None:
+        """Where aircraft may be that are protected against ionospheric fronts; None when none are."""
+        return places_of(self.params) if self.params.ionosphere.protects else None
 
     # --- monitors
 

@@ -11,6 +11,7 @@ from gbas_core.parameters import ParameterError, replaced
 from gbas_core.satellites import N_SATS, SAT_INDEX
 from gbas_ground.corrections.sigma import broadcast_sigmas
 from gbas_ground.ionosphere.geometry_screening import judge, least_safe, sent_sigma_m, subsets_of
+from gbas_ground.ionosphere.places import places_of
 from gbas_ground.ionosphere.protection import (
     Sky,
     cases_of,
@@ -20,6 +21,7 @@ from gbas_ground.ionosphere.protection import (
     protection_in_words,
 )
 from gbas_ground.params import GroundParams
+from gbas_ground.prepared import PreparedStation
 from gbas_ground.sections import MAX_SIGMA_VIG
 from gbas_sim.scenario import read_sections
 
@@ -54,7 +56,7 @@ def prepared(params, names=tuple(SKY)):
     places = np.flatnonzero(sent)
     groups = np.array([[name == "G" for name in ("G" if i < 32 else "E" for i in places)]])
     groups = np.concatenate([groups, ~groups]) if "E" in params.station.systems else groups
-    return cases_of(places, sky, params), groups
+    return cases_of(places, sky, params, places_of(params)), groups
 
 
 @pytest.mark.parametrize("max_missing", [0, 1, 2])
@@ -128,7 +130,7 @@ def test_the_least_inflation_is_safe_and_one_step_less_is_not(systems, ionospher
     """Every geometry of every case, none left out, by the second formulation."""
     params = station(systems, aircraft_aad="B", aircraft_speed_mps=[70.0, 70.0], d_max_m=8_000.0, **ionosphere)
     sent, sky = sky_of(params)
-    _, protection = protect(initial_ionosphere(), 0, sent, sky, params)
+    _, protection = protect(initial_ionosphere(), 0, sent, sky, params, PreparedStation(params).places)
     cases, groups = prepared(params)
     combinations = [(0,), (1,), (0, 1)] if systems == "GE" else [(0,)]
 
@@ -163,55 +165,55 @@ def test_the_least_inflation_is_safe_and_one_step_less_is_not(systems, ionospher
 def test_result_is_held_for_a_minute_and_made_anew_when_the_satellites_change():
     params = station()
     sent, sky = sky_of(params)
-    state, first = protect(initial_ionosphere(), 0, sent, sky, params)
-    state, held = protect(state, 59_500, sent, sky, params)
+    state, first = protect(initial_ionosphere(), 0, sent, sky, params, PreparedStation(params).places)
+    state, held = protect(state, 59_500, sent, sky, params, PreparedStation(params).places)
     assert held is first
-    renewed_state, renewed = protect(state, 60_000, sent, sky, params)
+    renewed_state, renewed = protect(state, 60_000, sent, sky, params, PreparedStation(params).places)
     assert renewed is not first
     assert renewed_state.renewed_key == 60_000
     fewer, less = sky_of(params, tuple(SKY)[1:])
-    changed_state, changed = protect(state, 30_000, fewer, less, params)
+    changed_state, changed = protect(state, 30_000, fewer, less, params, PreparedStation(params).places)
     assert changed.factor > first.factor  # a satellite less, and a weaker geometry
     assert np.isnan(changed.shape_m[SAT_INDEX["G01"]])
     assert changed_state.renewed_key == 0  # the minute goes on
     one, lost = sky_of(params, receivers=3.0)
-    assert protect(state, 30_000, one, lost, params)[1] is not first
+    assert protect(state, 30_000, one, lost, params, PreparedStation(params).places)[1] is not first
 
 
 def test_a_rise_of_sigma_vig_counts_when_every_aircraft_has_it():
     """Station data are sent each 10 s: for a minute the sigmas of the corrections make up for what is not credited."""
     params = station(affected=1, max_missing=0, aircraft_systems=["GE"])
     sent, sky = sky_of(params)
-    state, full = protect(initial_ionosphere(), 0, sent, sky, params)
+    state, full = protect(initial_ionosphere(), 0, sent, sky, params, PreparedStation(params).places)
     assert 4e-6 < full.sigma_vig < MAX_SIGMA_VIG
     assert full.factor == 0.0
     fewer, less = sky_of(params, ("G06", "G08", "G12", "G16", "G21", "E01", "E07", "E15"))
-    state, at_once = protect(state, 10_000, fewer, less, params)
+    state, at_once = protect(state, 10_000, fewer, less, params, PreparedStation(params).places)
     assert at_once.sigma_vig == full.sigma_vig
     assert at_once.factor > 0.0
-    state, minute = protect(state, 60_000, fewer, less, params)
+    state, minute = protect(state, 60_000, fewer, less, params, PreparedStation(params).places)
     assert minute.sigma_vig > full.sigma_vig
     assert minute.factor == at_once.factor
-    state, later = protect(state, 120_000, fewer, less, params)
+    state, later = protect(state, 120_000, fewer, less, params, PreparedStation(params).places)
     assert later.sigma_vig == minute.sigma_vig
     assert later.factor < at_once.factor
-    _, back = protect(state, 180_000, sent, sky, params)
+    _, back = protect(state, 180_000, sent, sky, params, PreparedStation(params).places)
     assert back.sigma_vig == full.sigma_vig
 
 
 def test_after_a_short_interruption_aircraft_may_still_have_the_sigma_vig_of_before():
     params = station(affected=1, max_missing=0, aircraft_systems=["GE"])
     sent, sky = sky_of(params)
-    state, full = protect(initial_ionosphere(), 0, sent, sky, params)
+    state, full = protect(initial_ionosphere(), 0, sent, sky, params, PreparedStation(params).places)
     few, little = sky_of(params, ("G01", "G06", "G08"))
-    state, nothing = protect(state, 1_000, few, little, params)
+    state, nothing = protect(state, 1_000, few, little, params, PreparedStation(params).places)
     assert nothing.sigma_vig == MAX_SIGMA_VIG
     fewer, less = sky_of(params, ("G06", "G08", "G12", "G16", "G21", "E01", "E07", "E15"))
-    soon, at_once = protect(state, 5_000, fewer, less, params)
+    soon, at_once = protect(state, 5_000, fewer, less, params, PreparedStation(params).places)
     assert at_once.sigma_vig > full.sigma_vig
     assert soon.credited_vig == full.sigma_vig
     assert at_once.factor > 0.0
-    later, fresh = protect(state, 61_000, fewer, less, params)
+    later, fresh = protect(state, 61_000, fewer, less, params, PreparedStation(params).places)
     assert later.credited_vig == fresh.sigma_vig
     assert fresh.factor < at_once.factor
 
@@ -224,7 +226,7 @@ def test_the_multiplier_is_the_least_any_aircraft_may_use():
     mixed[SAT_INDEX["G01"]] = 1.0
     places = np.flatnonzero(sent)
     multipliers = [
-        cases_of(places, sky._replace(receivers=each), params).k_ffmd
+        cases_of(places, sky._replace(receivers=each), params, places_of(params)).k_ffmd
         for each in (sky.receivers, mixed, np.where(sent, 1.0, np.nan), np.where(sent, 2.0, np.nan))
     ]
     assert multipliers == pytest.approx([5.847, 5.847, 6.86, 5.762], abs=5e-4)  # ICAO Annex 10, table B-67
@@ -233,7 +235,7 @@ def test_the_multiplier_is_the_least_any_aircraft_may_use():
 def test_a_type_d_station_keeps_its_other_sigmas():
     params = station()
     sent, sky = sky_of(params)
-    _, protection = protect(initial_ionosphere(), 0, sent, sky, params)
+    _, protection = protect(initial_ionosphere(), 0, sent, sky, params, PreparedStation(params).places)
     inflated = protection.inflated_m(sky.sigma_m)[sent]
     assert protection.factor > 0.0
     assert (inflated > sky.sigma_m[sent]).all()
@@ -243,11 +245,11 @@ def test_a_type_d_station_keeps_its_other_sigmas():
 def test_nothing_is_screened_without_a_threat_model_or_without_satellites():
     bare = station(threat_model="none")
     sent, sky = sky_of(bare)
-    _, protection = protect(initial_ionosphere(), 0, sent, sky, bare)
+    _, protection = protect(initial_ionosphere(), 0, sent, sky, bare, PreparedStation(bare).places)
     assert (protection.sigma_vig, protection.factor, protection.available) == (4e-6, 0.0, True)
     params = station("G")
     sent, sky = sky_of(params, ("G01", "G06", "G08"))
-    state, protection = protect(initial_ionosphere(), 0, sent, sky, params)
+    state, protection = protect(initial_ionosphere(), 0, sent, sky, params, PreparedStation(params).places)
     assert protection.sigma_vig == MAX_SIGMA_VIG
     assert state.protection is None
 
@@ -256,7 +258,7 @@ def test_where_no_inflation_is_enough_nothing_is_available():
     """Two satellites at once, 425 mm/km, out to 50 km with eight satellites: not below any alert limit, and said so."""
     params = station("G", threat_model="conus")
     sent, sky = sky_of(params)
-    _, protection = protect(initial_ionosphere(), 0, sent, sky, params)
+    _, protection = protect(initial_ionosphere(), 0, sent, sky, params, PreparedStation(params).places)
     assert not protection.available
     assert [cause for cause, _, _ in changes(None, protection)] == ["ionosphere_unprotected", "ionosphere_sigma_vig"]
 
@@ -265,7 +267,7 @@ def test_more_threat_takes_more_inflation():
     def inflation(**ionosphere):
         params = station(d_max_m=15_000.0, **ionosphere)
         sent, sky = sky_of(params)
-        protection = protect(initial_ionosphere(), 0, sent, sky, params)[1]
+        protection = protect(initial_ionosphere(), 0, sent, sky, params, PreparedStation(params).places)[1]
         return (not protection.available, protection.factor, protection.sigma_vig)
 
     base = inflation(affected=1)

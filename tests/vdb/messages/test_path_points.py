@@ -16,7 +16,7 @@ from gbas_ground.params import GroundParams
 from gbas_vdb.coding.bits import BitReader, BitWriter
 from gbas_vdb.messages import approach_tables, tables
 from gbas_vdb.messages.fields import Choice, FieldError, Letter
-from gbas_vdb.messages.layout import decode, encode
+from gbas_vdb.messages.layout import Layout, decode, encode
 from gbas_vdb.messages.path_point import PathPointError, checked_path_point, trusted_path_point
 from gbas_vdb.messages.types import FasBlock
 from vdb_oracle import CRC32Q, crc_remainder_bits
@@ -92,7 +92,8 @@ def test_route_letters_are_ia5_codes() -> None:
 
 def test_no_other_list_of_values_is_letters_in_a_row() -> None:
     """Lists coded by place are those the standard numbers so: designators and runway letters; letters have a class."""
-    layouts = [value for value in vars(tables).values() if isinstance(value, tables.Layout)]
+    named = vars(tables) | vars(approach_tables)
+    layouts = [value for value in named.values() if isinstance(value, Layout)]
     choices = {entry.name: entry.values for layout in layouts for entry in layout.entries if isinstance(entry, Choice)}
     assert choices == {
         "n_reference_receivers": (2, 3, 4, None),

@@ -15,67 +15,18 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final
 
 import numpy as np
 
 from gbas_core.record import BoolArray, FloatArray
+from gbas_ground.ionosphere.cases import Cases
 from gbas_ground.ionosphere.position_errors import Geometries, geometries
 
 SIGMA_STEP_M: Final = 0.02
 """Resolution of sigma_pr_gnd in a type 1 message [m]; sigmas are sent rounded up."""
 _ROUNDING: Final = 1e-6
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Cases:
-    """What does not change with the inflation; C cases of n satellites.
-
-    Attributes
-    ----------
-    los : (C, 3, n) array
-        Unit vectors to the satellites, approach frame.
-    tan_gpa : (C,) array
-        Tangent of the glide path angle.
-    base_m : (n,) array
-        Ground sigmas without inflation [m].
-    air2_m2 : (C, n) array
-        Variances of aircraft and troposphere [m^2].
-    iono_m : (C, n) array
-        Ionospheric sigma for a sigma_vig of 1 [m].
-    error_m : (C, n) array
-        Largest range errors in a front [m].
-    shape_m : (n,) array
-        Share of each satellite in the inflation of sigma_pr_gnd: its range error at the decision height [m].
-    limit_m : (2, C) array
-        Vertical and lateral alert limits, above which nobody has service [m].
-    tolerable_m : (2, C) array
-        Vertical and lateral errors that are tolerable [m].
-    k_ffmd : float
-        Multiplier of the protection level; the least an aircraft may use.
-    k_noise : float
-        Multiplier of the nominal error that may come on top of the front's.
-    nominal_vig : float
-        sigma_vig of the nominal error.
-    affected : int
-        Satellites a front affects at once, 1 or 2.
-    """
-
-    los: FloatArray
-    tan_gpa: FloatArray
-    base_m: FloatArray
-    air2_m2: FloatArray
-    iono_m: FloatArray
-    error_m: FloatArray
-    shape_m: FloatArray
-    limit_m: FloatArray
-    tolerable_m: FloatArray
-    k_ffmd: float
-    k_noise: float
-    nominal_vig: float
-    affected: int
 
 
 @lru_cache(maxsize=64)
@@ -140,21 +91,9 @@ def judge(
         End at the first geometry that is not safe.
     """
     gnd2 = sent_sigma_m(cases.base_m, cases.shape_m, factor) ** 2
-    return geometries(
-        cases.los,
-        cases.tan_gpa,
-        gnd2 + cases.air2_m2 + (sigma_vig * cases.iono_m) ** 2,
-        cases.base_m**2 + cases.air2_m2 + (cases.nominal_vig * cases.iono_m) ** 2,
-        cases.error_m,
-        groups,
-        subsets,
-        cases.limit_m,
-        cases.tolerable_m,
-        k_ffmd=cases.k_ffmd,
-        k_noise=cases.k_noise,
-        affected=cases.affected,
-        first_only=first_only,
-    )
+    variance = gnd2 + cases.air2_m2 + (sigma_vig * cases.iono_m) ** 2
+    nominal = cases.base_m**2 + cases.air2_m2 + (cases.nominal_vig * cases.iono_m) ** 2
+    return geometries(cases, variance, nominal, groups, subsets, first_only=first_only)
 
 
 def least_safe(is_safe: Callable[[int], bool], largest: int, start: int) -> int | None:

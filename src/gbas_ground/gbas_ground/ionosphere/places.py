@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
@@ -58,7 +57,6 @@ class Places:
     credit: DivergenceCredit | None
 
 
-@lru_cache(maxsize=8)
 def places_of(params: GroundParams) -> Places:
     """Places along every approach from the threshold to the largest distance of use."""
     section, station = params.ionosphere, params.reference_point_m()

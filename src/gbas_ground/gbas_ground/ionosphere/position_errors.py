@@ -15,6 +15,7 @@ import numpy as np
 
 from gbas_core.compiled import compiled
 from gbas_core.record import BoolArray, FloatArray
+from gbas_ground.ionosphere.cases import Cases
 
 _SINGULAR: Final = 1e-9
 """Of the product of the diagonal: a determinant below it is rounding, and the geometry has no position."""
@@ -125,49 +126,32 @@ class Geometries(NamedTuple):
 
 
 def geometries(
-    los: FloatArray,
-    tan_gpa: FloatArray,
+    cases: Cases,
     variance_m2: FloatArray,
     nominal_m2: FloatArray,
-    front_m: FloatArray,
     groups: BoolArray,
     subsets: BoolArray,
-    limit_m: FloatArray,
-    tolerable_m: FloatArray,
     *,
-    k_ffmd: float,
-    k_noise: float,
-    affected: int,
     first_only: bool = False,
 ) -> Geometries:
     """Judge every case with every subset.
 
     Parameters
     ----------
-    los : (C, 3, n) array
-        Unit vectors to the satellites, approach frame.
-    tan_gpa : (C,) array
-        Tangent of the glide path angle.
+    cases : Cases
     variance_m2, nominal_m2 : (C, n) arrays
         Variances the aircraft takes, and those of the error without a front [m^2].
-    front_m : (C, n) array
-        Largest range errors in a front [m].
     groups, subsets : (k, n), (B, n) bool arrays
         Satellites of each clock; sets an aircraft may use.
-    limit_m, tolerable_m : (2, C) arrays
-        Alert limits and tolerable errors, vertical and lateral [m].
-    k_ffmd, k_noise : float
-        Multipliers of the protection level and of the error without a front.
-    affected : int
-        Satellites a front affects, 1 or 2.
     first_only : bool
         End at the first geometry that is not safe; what was not looked at is NaN.
     """
-    shape = (los.shape[0], subsets.shape[0], 2)
+    shape = (cases.los.shape[0], subsets.shape[0], 2)
     level, wrong = np.full(shape, np.nan), np.full(shape, np.nan)
     not_safe = _judge(
-        np.ascontiguousarray(los), tan_gpa, variance_m2, nominal_m2, front_m, groups.argmax(axis=0), len(groups),
-        subsets, limit_m, tolerable_m, k_ffmd, k_noise, affected, first_only, level, wrong,
+        np.ascontiguousarray(cases.los), cases.tan_gpa, variance_m2, nominal_m2, cases.error_m, groups.argmax(axis=0),
+        len(groups), subsets, cases.limit_m, cases.tolerable_m, cases.k_ffmd, cases.k_noise, cases.affected,
+        first_only, level, wrong,
     )  # fmt: skip
     return Geometries(level, wrong, int(not_safe))
 
@@ -175,8 +159,9 @@ def geometries(
 @lru_cache(maxsize=1)
 def compile_ahead() -> None:
     """Compile now, not at the first epoch that is screened; once a machine it takes some seconds."""
-    ones, flags = np.ones((1, 1)), np.ones((1, 1), dtype=bool)
-    geometries(
-        np.ones((1, 3, 1)), np.ones(1), ones, ones, ones, flags, flags, np.ones((2, 1)), np.ones((2, 1)),
-        k_ffmd=1.0, k_noise=1.0, affected=1,
+    one, ones, flags = np.ones(1), np.ones((1, 1)), np.ones((1, 1), dtype=bool)
+    cases = Cases(
+        los=np.ones((1, 3, 1)), tan_gpa=one, base_m=one, air2_m2=ones, iono_m=ones, error_m=ones, shape_m=one,
+        limit_m=np.ones((2, 1)), tolerable_m=np.ones((2, 1)), k_ffmd=1.0, k_noise=1.0, nominal_vig=0.0, affected=1,
     )  # fmt: skip
+    geometries(cases, ones, ones, flags, flags)

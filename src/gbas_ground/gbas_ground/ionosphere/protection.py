@@ -22,8 +22,9 @@ from gbas_core.models.missed_detection import K_FFMD_SINGLE, k_ffmd
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import N_SATS, SYSTEM_MASKS
 from gbas_ground.corrections.sigma import MAX_SIGMA_M
-from gbas_ground.ionosphere.geometry_screening import Cases, judge, least_safe, sent_sigma_m, subsets_of
-from gbas_ground.ionosphere.places import Places, places_of
+from gbas_ground.ionosphere.cases import Cases
+from gbas_ground.ionosphere.geometry_screening import judge, least_safe, sent_sigma_m, subsets_of
+from gbas_ground.ionosphere.places import Places
 from gbas_ground.ionosphere.range_error import worst_range_error_m
 from gbas_ground.ionosphere.threat import FrontThreat
 from gbas_ground.param_checks import MIN_SERVICE_SATELLITES
@@ -102,7 +103,7 @@ def initial_ionosphere() -> IonosphereState:
 
 
 def protect(
-    state: IonosphereState, key: int, sent: BoolArray, sky: Sky, params: GroundParams
+    state: IonosphereState, key: int, sent: BoolArray, sky: Sky, params: GroundParams, places: Places | None
 ) -> tuple[IonosphereState, Protection]:
     """Protection of one epoch.
 
@@ -115,8 +116,10 @@ def protect(
         Satellites that would be broadcast.
     sky : Sky
     params : GroundParams
+    places : Places or None
+        Where aircraft may be that are protected; None: nothing is to be protected.
     """
-    if not params.ionosphere.protects:
+    if places is None:
         return state, Protection(sigma_vig=params.atmosphere.sigma_vert_iono_gradient, shape_m=np.zeros(N_SATS))
     if np.count_nonzero(sent) < MIN_SERVICE_SATELLITES:  # nobody has a position; the most cautious values
         return _interrupted(state, key), Protection(sigma_vig=MAX_SIGMA_VIG, shape_m=np.zeros(N_SATS))
@@ -126,7 +129,7 @@ def protect(
     satellites = np.where(sent, sky.receivers, 0.0)
     if before is not None and not renew and bool((satellites == state.satellites).all()):
         return state, before
-    screening = _Screening.of(sent, sky, params)
+    screening = _Screening.of(sent, sky, params, places)
     if before is None:
         sigma_vig = credited = screening.least_vig(MAX_SIGMA_VIG)
         if not elapsed:  # after a short interruption an aircraft may have what was sent before it
@@ -181,13 +184,14 @@ class _Screening:
     subsets: BoolArray
 
     @classmethod
-    def of(cls, sent: BoolArray, sky: Sky, params: GroundParams) -> _Screening:
+    def of(cls, sent: BoolArray, sky: Sky, params: GroundParams, places: Places) -> _Screening:
         satellites = np.flatnonzero(sent)
         section = params.ionosphere
         letters = [each for each in params.station.systems if (SYSTEM_MASKS[each] & sent).any()]
         groups = np.array([SYSTEM_MASKS[each][satellites] for each in letters])
         subsets = subsets_of(groups, _combinations(letters, section.aircraft_systems), section.max_missing)
-        return cls(satellites=satellites, cases=cases_of(satellites, sky, params), groups=groups, subsets=subsets)
+        cases = cases_of(satellites, sky, params, places)
+        return cls(satellites=satellites, cases=cases, groups=groups, subsets=subsets)
 
     def safe(self, sigma_vig: float, factor: float) -> bool:
         sigma_m = sent_sigma_m(self.cases.base_m, self.cases.shape_m, factor)
@@ -250,7 +254,7 @@ def range_errors_m(
     return np.asarray(errors.max(axis=0))
 
 
-def cases_of(satellites: NDArray[np.int64], sky: Sky, params: GroundParams) -> Cases:
+def cases_of(satellites: NDArray[np.int64], sky: Sky, params: GroundParams, places: Places) -> Cases:
     """Everything of a sky that does not change with the inflation.
 
     Parameters
@@ -259,9 +263,11 @@ def cases_of(satellites: NDArray[np.int64], sky: Sky, params: GroundParams) -> C
         Their places on the satellite axis.
     sky : Sky
     params : GroundParams
+    places : Places
+        Where aircraft may be.
     """
     elevation, azimuth, base, receivers = (each[satellites] for each in sky)
-    section, mask, places = params.ionosphere, params.monitors.elevation_mask_rad, places_of(params)
+    section, mask = params.ionosphere, params.monitors.elevation_mask_rad
     up = np.stack([np.cos(elevation) * np.sin(azimuth), np.cos(elevation) * np.cos(azimuth), np.sin(elevation)])
     air = np.stack([sigma_air(aad, elevation, mask_rad=mask) for aad in _DESIGNATORS])
     tropo = sigma_tropo_m(

@@ -59,7 +59,7 @@ def _protect(
     sent = highest_sent(usable, predicted.elevation_rad, station.frames.room) if params.ionosphere.protects else usable
     corrections = corrected.corrections
     sky = Sky(predicted.elevation_rad, predicted.azimuth_rad, corrections.sigmas.gnd_m, corrections.count)
-    ionosphere, protection = protect(state, now.epoch_ms, sent, sky, params)
+    ionosphere, protection = protect(state, now.epoch_ms, sent, sky, params, station.places)
     if ionosphere.protection is not None and ionosphere.protection is not state.protection:
         for cause, value, threshold in changes(state.protection, ionosphere.protection):
             now.events.add(EventKind.STATION, "station", cause, value, threshold)
