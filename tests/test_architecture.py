@@ -1,4 +1,5 @@
-"""House rules one could break without noticing: which package may import which, and no paths of one machine."""
+"""House rules one could break without noticing: which package may import which, how large modules and functions may
+be, and no paths of one machine."""
 
 from __future__ import annotations
 
@@ -229,6 +230,104 @@ def test_simulated_world_uses_messages_only_in_its_nodes() -> None:
 def test_a_wrong_arrow_is_seen() -> None:
     source = "def late():\n    import gbas_ground.station\n    importlib.import_module('rclpy')\n"
     assert {"gbas_ground.station", "rclpy"} <= imported_modules(source)
+
+
+MOST_LINES = 400
+"""Of a module, all of its lines: text, comments and docstrings too."""
+MOST_LINES_OF_FUNCTION = 60
+"""From its ``def`` to its end, without its docstring."""
+MOST_PARAMETERS = 6
+"""Of a function, ``self`` and ``cls`` not counted. Two kinds of function may have more: a command, whose parameters are
+its options (every argument annotated for typer), and a compiled kernel, which takes arrays and numbers, no records."""
+_EPOCH = "open: to be split when the steps of an epoch are compiled"
+_CAMPAIGN = "open: to be split when campaigns are distributed"
+TOO_LARGE: dict[str, str] = {
+    "gbas_core/ranging/divergence.py:_advanced": _EPOCH,
+    "gbas_core/ranging/slips.py": _EPOCH,
+    "gbas_ground/consistency.py:readmission_state": "open: needs one record of what the monitors say, from the stage that asks",
+    "gbas_ground/monitors/carrier_acceleration.py": _EPOCH,
+    "gbas_ground/monitors/carrier_acceleration.py:_statistics": _EPOCH,
+    "gbas_ground/monitors/carrier_acceleration.py:carrier_acceleration_step": _EPOCH,
+    "gbas_ground/monitors/carrier_acceleration.py:detectable_fault": _EPOCH,
+    "gbas_ground/monitors/ccd.py:ccd_step": _EPOCH,
+    "gbas_ground/monitors/ccd_f.py": _EPOCH,
+    "gbas_ground/monitors/divergence_covariance.py:calibrate": _EPOCH,
+    "gbas_ground/monitors/divergence_covariance.py:measurement_covariance": _EPOCH,
+    "gbas_ground/monitors/ephemeris_residual.py:ephemeris_residual_step": _EPOCH,
+    "gbas_ground/monitors/ephemeris_residual.py:site_decorrelation": _EPOCH,
+    "gbas_ground/monitors/gradient_estimates.py:gradient_vectors": _EPOCH,
+    "gbas_ground/monitors/ionosphere_gradient.py": _EPOCH,
+    "gbas_ground/monitors/shared_receiver.py:shared_receiver": _EPOCH,
+    "gbas_studies/faults/campaign.py": _CAMPAIGN,
+    "gbas_studies/faults/campaign.py:run_campaign": _CAMPAIGN,
+    "gbas_studies/fronts/campaign.py:draw": _CAMPAIGN,
+}
+"""Module, or module and function: why it may be larger. Nothing else may, and nothing that need not."""
+
+
+def parameters_of(function: ast.FunctionDef | ast.AsyncFunctionDef) -> list[ast.arg]:
+    """Parameters that count."""
+    given = function.args
+    every = [*given.posonlyargs, *given.args, *given.kwonlyargs, *filter(None, (given.vararg, given.kwarg))]
+    return [each for each in every if each.arg not in ("self", "cls")]
+
+
+def is_kernel(function: ast.FunctionDef | ast.AsyncFunctionDef) -> bool:
+    """Whether it is compiled: under :func:`gbas_core.compiled.compiled`, alone or with arguments."""
+    names = [each.func if isinstance(each, ast.Call) else each for each in function.decorator_list]
+    return any(isinstance(each, ast.Name) and each.id == "compiled" for each in names)
+
+
+COMMAND_TYPES = {"Json", "BagPath", "Verbose", "Speed", "SingleProcess", "Domain", "File"}
+"""Types with an option of typer that several commands share."""
+
+
+def is_command(function: ast.FunctionDef | ast.AsyncFunctionDef) -> bool:
+    """Whether it is a command of typer: each of its arguments is annotated with an option or argument."""
+    annotations = [ast.unparse(each.annotation) for each in parameters_of(function) if each.annotation is not None]
+    options = [each in COMMAND_TYPES or "typer.Option(" in each or "typer.Argument(" in each for each in annotations]
+    return bool(options) and len(options) == len(parameters_of(function)) and all(options)
+
+
+def lines_of(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
+    text = function.body[0] if ast.get_docstring(function) is not None else None
+    docstring = 0 if text is None else (text.end_lineno or 0) - text.lineno + 1
+    return (function.end_lineno or 0) - function.lineno + 1 - docstring
+
+
+def too_large(name: str, source: str) -> dict[str, str]:
+    """What of a module is over a limit, and by what."""
+    found = {}
+    if (lines := len(source.splitlines())) > MOST_LINES:
+        found[name] = f"{lines} lines"
+    for node in ast.walk(ast.parse(source)):
+        if not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            continue
+        many = 0 if is_kernel(node) or is_command(node) else len(parameters_of(node))
+        wrong = [f"{lines} lines"] if (lines := lines_of(node)) > MOST_LINES_OF_FUNCTION else []
+        wrong += [f"{many} parameters"] if many > MOST_PARAMETERS else []
+        if wrong:
+            found[f"{name}:{node.name}"] = ", ".join(wrong)
+    return found
+
+
+def test_modules_and_functions_are_small() -> None:
+    found: dict[str, str] = {}
+    for path in MODULES:
+        found |= too_large("/".join(path.relative_to(SOURCE).parts[1:]), path.read_text(encoding="utf-8"))
+    assert {name: size for name, size in found.items() if name not in TOO_LARGE} == {}
+    assert set(TOO_LARGE) - set(found) == set(), "no longer needed"
+
+
+def test_what_is_too_large_is_seen() -> None:
+    many = ", ".join(f"p{k}: float" for k in range(7))
+    function = f'def f(self, {many}):\n    """{"word" * 10}"""\n' + "    x = 1\n" * 60
+    assert too_large("m.py", function) == {"m.py:f": "61 lines, 7 parameters"}
+    assert too_large("m.py", f"@compiled\ndef f({many}): ...\n" + "\n" * 398) == {}
+    assert too_large("m.py", "\n" * 401) == {"m.py": "401 lines"}
+    options = ", ".join(f"p{k}: Annotated[int, typer.Option()] = 1" for k in range(7))
+    assert too_large("m.py", f"def f({options}): ...") == {}
+    assert too_large("m.py", f"def f({options}, plain: int = 1): ...") == {"m.py:f": "8 parameters"}
 
 
 # A path into somebody's home, or into the root of one machine, works for nobody else. System places that every

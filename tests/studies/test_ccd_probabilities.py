@@ -15,7 +15,7 @@ from gbas_studies.ccd.missed_detection import (
     required_p_md,
 )
 from gbas_studies.ccd.monitors import monitor_for, one_sided_threshold_mps
-from gbas_studies.ccd.rare_events import COLUMNS, single_frequency, two_frequency
+from gbas_studies.ccd.rare_events import COLUMNS, Sampling, single_frequency, two_frequency
 
 SIGMA, THRESHOLD = 0.00399, 0.0233
 NOISE_M = np.array([0.3, 0.2, 0.003, 0.004])
@@ -65,17 +65,19 @@ def agrees(found, exact):
 
 
 def test_false_alarms_to_1e_9():
-    common = {"alarm": True, "samples": 4000, "params": QUICK}
-    agrees(single_frequency(0.0, SIGMA, THRESHOLD, seed=1, **common), 2.0 * norm.sf(THRESHOLD / SIGMA))
+    def sampling(seed: int) -> Sampling:
+        return Sampling(samples=4000, seed=seed, params=QUICK)
+
+    agrees(single_frequency(0.0, SIGMA, THRESHOLD, sampling(1), alarm=True), 2.0 * norm.sf(THRESHOLD / SIGMA))
     exact = 2.0 * norm.sf(0.02438 / SIGMA)
     assert exact == pytest.approx(1e-9, rel=0.02)
-    agrees(single_frequency(0.0, SIGMA, 0.02438, seed=2, **common), exact)
-    agrees(two_frequency(None, 0.0, NOISE_M, seed=3, **common), 1e-9)
+    agrees(single_frequency(0.0, SIGMA, 0.02438, sampling(2), alarm=True), exact)
+    agrees(two_frequency(None, 0.0, NOISE_M, sampling(3), alarm=True), 1e-9)
 
 
 @pytest.mark.parametrize("rate", [0.01, 0.03, 0.0473])
 def test_missed_detections_of_one_frequency(rate):
-    found = single_frequency(rate, SIGMA, THRESHOLD, alarm=False, samples=4000, seed=4, params=QUICK)
+    found = single_frequency(rate, SIGMA, THRESHOLD, Sampling(samples=4000, seed=4, params=QUICK), alarm=False)
     agrees(found, norm.cdf((THRESHOLD - rate) / SIGMA))
 
 
@@ -86,16 +88,16 @@ def test_missed_detections_of_two_frequencies(mode, sizes):
     covariance = (white_noise_gain(alpha) / 0.5) ** 2 * (COLUMNS * NOISE_M**2) @ COLUMNS.T
     means = COLUMNS @ fault_direction(mode)
     rate = sizes / np.sqrt(means @ np.linalg.solve(covariance, means))
-    found = two_frequency(mode, rate, NOISE_M, alarm=False, samples=4000, seed=5, params=QUICK)
+    found = two_frequency(mode, rate, NOISE_M, Sampling(samples=4000, seed=5, params=QUICK), alarm=False)
     agrees(found, ncx2.cdf(chi2.isf(1e-9, 3), 3, sizes**2))
 
 
 def test_ground_filters_too():
-    found = single_frequency(0.0, SIGMA, THRESHOLD, alarm=True, samples=2000, seed=6, params=GROUND)
+    found = single_frequency(0.0, SIGMA, THRESHOLD, Sampling(samples=2000, seed=6, params=GROUND), alarm=True)
     agrees(found, 2.0 * norm.sf(THRESHOLD / SIGMA))
 
 
 def test_the_same_seed_gives_the_same_bits():
-    common = {"alarm": True, "samples": 200, "seed": 7, "params": QUICK}
-    first, second = (single_frequency(0.0, SIGMA, THRESHOLD, **common) for _ in range(2))
+    sampling = Sampling(samples=200, seed=7, params=QUICK)
+    first, second = (single_frequency(0.0, SIGMA, THRESHOLD, sampling, alarm=True) for _ in range(2))
     assert first == second

@@ -9,7 +9,7 @@ from gbas_core.ranging.divergence import AIRBORNE, divergence_step, initial_dive
 from gbas_core.ranging.smoothing import SmoothingParams, initial_smoothing, smooth_step
 from gbas_studies.ccd.smoothed_error import LONG_BEFORE, Smoothing, StudyError
 from gbas_studies.faults.campaign import front_cases
-from gbas_studies.faults.front_exposure import front_limit, slope_error_s
+from gbas_studies.faults.front_exposure import Encounter, front_limit, slope_error_s
 
 FRONT_MPS, RADIUS_M, T_S = 100.0, 450.0, 0.5
 
@@ -54,7 +54,7 @@ def test_slope_error_is_the_textbooks():
 @pytest.mark.parametrize("acquiring", [True, False])
 @pytest.mark.parametrize("gradient", [600e-6, 2000e-6])
 def test_the_aircraft_found_passes_the_limit_then_and_not_before(gradient, acquiring):
-    found = front_limit(gradient, FRONT_MPS, Smoothing(), acquiring=acquiring)
+    found = front_limit(gradient, FRONT_MPS, Smoothing(), Encounter(acquiring=acquiring))
     met_s = found.since_touch_s - found.on_slope_s
     assert abs(found.distance_m) <= 6200.0 + 1e-6
     begin_s = met_s - 200.0
@@ -102,7 +102,7 @@ def test_farther_aircraft_and_steeper_fronts_are_earlier():
     times = [front_limit(each, FRONT_MPS, Smoothing()).since_touch_s for each in (300e-6, 600e-6, 2000e-6)]
     assert times[0] > times[1] > times[2]
     assert times[0] > 0.0 > times[2]  # 300 mm/km reaches the station first, 2000 mm/km the aircraft
-    far = front_limit(2000e-6, FRONT_MPS, Smoothing(), farthest_m=11_000.0).since_touch_s
+    far = front_limit(2000e-6, FRONT_MPS, Smoothing(), Encounter(farthest_m=11_000.0)).since_touch_s
     # Before the touch only the place matters: 4.8 km more at the front's speed.
     assert far == pytest.approx(times[2] - 48.0, abs=1e-9)
     assert front_limit(1e-6, FRONT_MPS, Smoothing()).since_touch_s == np.inf
@@ -111,7 +111,7 @@ def test_farther_aircraft_and_steeper_fronts_are_earlier():
 
 
 def test_the_airborne_monitor_alarms_when_its_filters_do():
-    found = front_limit(2000e-6, FRONT_MPS, Smoothing(), acquiring=False)
+    found = front_limit(2000e-6, FRONT_MPS, Smoothing(), Encounter(acquiring=False))
     met_s = found.since_touch_s - found.on_slope_s
     state, none = initial_divergence(AIRBORNE, n_sats=1), np.zeros(1, dtype=bool)
     rate_mps, alarm_s = 2000e-6 * (FRONT_MPS - found.aircraft_mps), np.inf

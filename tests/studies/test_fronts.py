@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gbas_cli.study_fronts import plan_of
+from gbas_cli.study_fronts import Asked, plan_of
 from gbas_core.errors import GbasError
 from gbas_core.satellites import SAT_INDEX
 from gbas_sim.atmosphere.fronts import WedgeFront
@@ -28,7 +28,8 @@ OUTWARD = math.radians(84.73)  # where the aircraft comes from
 @pytest.fixture(scope="module")
 def plan():
     made = plan_of(
-        "quiet_approach", systems="G", threat="conus", protections=(BARE, GERMANY, CONUS), interval_s=1.0, runs=14
+        "quiet_approach",
+        Asked(systems="G", threat="conus", protections=(BARE, GERMANY, CONUS), interval_s=1.0, runs=14),
     )
     # the filters settle in 230 s, and the last 6 km begin then
     flight = replace(made.world.flight, level_time_s=225.0)
@@ -173,14 +174,14 @@ def test_a_short_campaign_of_the_declared_model(plan, stage):
 
 def test_plans_that_are_none():
     with pytest.raises(GbasError, match="--threat 'mars' is not one of"):
-        plan_of("quiet_approach", threat="mars")
+        plan_of("quiet_approach", Asked(threat="mars"))
 
 
 @pytest.mark.campaign
 def test_the_campaign_of_the_declared_model():
     """5,600 fronts on the shipped station, GPS alone and with Galileo: no misleading position."""
     for systems in ("G", "GE"):
-        rows = run_campaign(plan_of("quiet_approach", systems=systems, runs=2_800), workers=2)
+        rows = run_campaign(plan_of("quiet_approach", Asked(systems=systems, runs=2_800)), workers=2)
         assert sum(row["runs"] for row in rows if row["station"] == "own") == 2_800
         assert sum(row["misleading_epochs"] for row in rows if row["station"] == "own") == 0
         assert sum(row["misleading_runs"] for row in rows if row["station"] == "none") > 500

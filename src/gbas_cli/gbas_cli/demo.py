@@ -43,17 +43,15 @@ class DemoResult:
     summary: dict[str, Any]
 
 
-def demo(
+def demo_plan(
     directory: Path,
     *,
     config: Path | None = None,
     speed: float = 0.0,
     single_process: bool = False,
-    verbose: bool = False,
-    quiet: bool = False,
     command: str = "",
-) -> DemoResult:
-    """Fly the approach of a configuration through live nodes, record it, and report from the bag.
+) -> RunPlan:
+    """The run that flies the approach of a configuration through live nodes and records it.
 
     Parameters
     ----------
@@ -67,10 +65,10 @@ def demo(
     Raises
     ------
     GbasError
-        When the run fails.
+        When the configuration cannot be run.
     """
     run_config = read_run_config(config or config_path(DEMO_CONFIG)).with_nodes().written(directory)
-    plan = RunPlan(
+    return RunPlan(
         config=run_config,
         directory=directory,
         speed=speed,
@@ -79,8 +77,18 @@ def demo(
         isolated=True,
         command=command,
     )
+
+
+def demo(plan: RunPlan, *, verbose: bool = False, quiet: bool = False) -> DemoResult:
+    """Run it, and report from the bag.
+
+    Raises
+    ------
+    GbasError
+        When the run fails.
+    """
     execute(plan, title="approach", verbose=verbose, quiet=quiet)
-    return report_bag(plan.bag_path, directory, config=run_config.path)
+    return report_bag(plan.bag_path, plan.directory, config=plan.config.path)
 
 
 def report_bag(bag: Path, directory: Path, *, config: Path) -> DemoResult:

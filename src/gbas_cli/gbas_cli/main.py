@@ -92,15 +92,14 @@ def demo(
     from gbas_bringup.resources import named_config
     from gbas_cli import demo as body
 
-    result = body.demo(
+    plan = body.demo_plan(
         new_out(out, "demo"),
         config=None if config is None else named_config(config),
         speed=speed_option(speed),
         single_process=single_process,
-        verbose=verbose,
-        quiet=as_json,
         command=command_line(),
     )
+    result = body.demo(plan, verbose=verbose, quiet=as_json)
     places = {"bag": result.bag, "table": result.csv, "picture": result.picture, "summary": result.summary_file}
     if as_json:
         print_json({**result.summary, "files": {name: str(path) for name, path in places.items()}})

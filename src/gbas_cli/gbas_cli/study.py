@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -11,6 +11,9 @@ from gbas_cli import study_faults as cli_study_faults
 from gbas_cli import study_fronts as cli_study_fronts
 from gbas_cli import study_gradient as cli_study_gradient
 from gbas_cli.base import Json, print_json
+
+if TYPE_CHECKING:
+    from gbas_studies.ccd.worst_case import Worst
 
 study_app = typer.Typer(help="Sweeps and campaigns beyond the published ones.", no_args_is_help=True)
 
@@ -68,17 +71,15 @@ def ccd(
     """
     from gbas_studies.ccd.monitors import error_on_of
     from gbas_studies.ccd.smoothed_error import Smoothing, start_of
-    from gbas_studies.ccd.worst_case import Grid, study, worst_error_any_rate
+    from gbas_studies.ccd.worst_case import Exclusion, Grid, study, worst_error_any_rate
 
     grid = Grid(d_step_mps=d_step, d_max_mps=d_max, onset_step_s=onset_step, onset_max_s=onset_max)
     smoothing = Smoothing(
         start=start_of(variant), delay_s=delay, ground_settle_s=ground_settle,
         ground_age_s=float("inf") if ground_age is None else ground_age,
     )  # fmt: skip
-    error, mapping, found = study(
-        mode, monitor, smoothing, grid, error_on=error_on_of(error_on), exclusion_delay_s=exclusion_delay,
-        receivers=receivers,
-    )  # fmt: skip
+    exclusion = Exclusion(error_on=error_on_of(error_on), delay_s=exclusion_delay, receivers=receivers)
+    error, mapping, found = study(mode, monitor, smoothing, grid, exclusion)
     anywhere = worst_error_any_rate(found, d_max)
     if as_json:
         print_json(
@@ -95,12 +96,15 @@ def ccd(
             }
         )
         return
-    unit = "1/s" if monitor == "gast-d" else "1/m"
+    print(f"{mode}, {variant} filter, {monitor}; times are the air filter's start after the fault's onset")
+    _print_worst(error, anywhere, mapping, "1/s" if monitor == "gast-d" else "1/m")
+
+
+def _print_worst(error: Worst, anywhere: Worst, mapping: Worst, unit: str) -> None:
     rows = {
         "largest undetected error": f"{error.value:.6g} m at {error.d_mps:g} m/s, {error.onset_s:+g} s",
         "the same, any rate": f"{anywhere.value:.6g} m at {anywhere.d_mps:.6g} m/s, {anywhere.onset_s:+g} s",
         "smallest mapping function": f"{mapping.value:.6g} {unit} at {mapping.d_mps:g} m/s, {mapping.onset_s:+g} s",
     }
-    print(f"{mode}, {variant} filter, {monitor}; times are the air filter's start after the fault's onset")
     for name, value in rows.items():
         print(f"{name:26} {value}")

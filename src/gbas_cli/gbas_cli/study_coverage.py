@@ -62,7 +62,7 @@ def coverage(
                 site = studied.papers_multiplier(site) if paper else site
                 multipliers[what] = [each.k_ffd for each in site.tests]
                 tables[what] = studied.study(
-                    elevation, site, params, np.random.default_rng(seed), repetitions=repetitions,
+                    elevation, site, params, studied.Trials(np.random.default_rng(seed), repetitions),
                     progress=_noted(update, what),
                 )  # fmt: skip
     if as_json:

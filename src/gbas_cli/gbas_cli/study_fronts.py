@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,6 +14,7 @@ from gbas_cli.base import Json, print_json
 from gbas_core.errors import GbasError
 
 if TYPE_CHECKING:
+    from gbas_ground.params import GroundParams
     from gbas_studies.fronts.campaign import Plan
 
 
@@ -54,10 +56,11 @@ def fronts(
     for each in kinds:
         if each not in KINDS:
             raise GbasError(f"--kind {each!r} is not one of {', '.join(KINDS)}")
-    plan = plan_of(
-        scenario, threat=threat, protections=tuple(protection or ()), systems=systems, runs=runs, kinds=kinds,
-        within_m=within, seed=seed,
+    asked = Asked(
+        threat=threat, protections=tuple(protection or ()), systems=systems, runs=runs, kinds=kinds, within_m=within,
+        seed=seed,
     )  # fmt: skip
+    plan = plan_of(scenario, asked)
     with progress("fronts", enabled=not as_json) as update:
         rows = run_campaign(plan, workers=workers, progress=lambda done, total: update(done, total, ""))
     if out is not None:
@@ -69,18 +72,38 @@ def fronts(
         _print(rows)
 
 
-def plan_of(
-    scenario: str,
-    *,
-    threat: str = "",
-    protections: Sequence[str] = (),
-    systems: str = "GE",
-    runs: int = 700,
-    kinds: Sequence[str] = (),
-    within_m: float = 6_000.0,
-    seed: int = 1,
-    interval_s: float | None = None,
-) -> Plan:
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """What of a campaign is asked for.
+
+    Attributes
+    ----------
+    threat : str
+        Threat model the fronts are drawn from; empty: the station's own.
+    protections : sequence of str
+        Stations to meet them, ``NAME[:KEY=VALUE,...]``; none: without protection, and the scenario's own.
+    systems : str
+    runs : int
+    kinds : sequence of str
+        Of fronts; none: all.
+    within_m : float
+        Distance to the threshold looked at [m].
+    seed : int
+    interval_s : float, optional
+        Between epochs, in place of the scenario's [s].
+    """
+
+    threat: str = ""
+    protections: Sequence[str] = ()
+    systems: str = "GE"
+    runs: int = 700
+    kinds: Sequence[str] = ()
+    within_m: float = 6_000.0
+    seed: int = 1
+    interval_s: float | None = None
+
+
+def plan_of(scenario: str, asked: Asked) -> Plan:
     """The campaign on a scenario: its world without threats, as long as filters and approach take.
 
     Raises
@@ -94,7 +117,6 @@ def plan_of(
     from gbas_bringup.resources import named_config
     from gbas_ground.ionosphere.section import NO_THREAT
     from gbas_ground.ionosphere.threat import THREATS
-    from gbas_ground.params import GroundParams
     from gbas_sim.flight.straight_in import StraightIn
     from gbas_sim.scenario import read_sections, scenario_from_yaml
     from gbas_studies.fronts.campaign import KINDS, Plan
@@ -103,8 +125,40 @@ def plan_of(
     sections, world = read_sections(path), scenario_from_yaml(path)
     if not isinstance(world.flight, StraightIn):
         raise GbasError(f"--scenario {scenario} has no straight approach")
-    ground = dict(sections["ground"]) | {"station": dict(sections["ground"]["station"]) | {"systems": systems}}
+    of_systems = {"systems": asked.systems}
+    ground = dict(sections["ground"]) | {"station": dict(sections["ground"]["station"]) | of_systems}
     own = dict(ground.get("ionosphere", {}))
+    drawn = asked.threat or own.get("threat_model", NO_THREAT)
+    if drawn not in THREATS:
+        raise GbasError(f"--threat {drawn!r} is not one of {', '.join(THREATS)}")
+    flight = replace(world.flight, intercept_distance_m=asked.within_m + 1_000.0, level_time_s=_LEVEL_S)
+    shorter_s = round(world.length_s - flight.duration_s, 1)  # it ends when the scenario's does
+    return Plan(
+        world=replace(
+            world,
+            flight=flight,
+            systems=asked.systems,
+            faults=(),
+            fronts=(),
+            duration_s=None,
+            interval_s=asked.interval_s or world.interval_s,
+            start_tow_s=world.start_tow_s + shorter_s,
+        ),
+        stations=_stations(ground, own, asked.protections),
+        aircraft=AirborneParams.from_mapping(dict(sections["airborne"]) | of_systems),
+        threat=THREATS[drawn],
+        kinds=tuple(asked.kinds or KINDS),
+        runs=asked.runs,
+        within_m=asked.within_m,
+        seed=asked.seed,
+    )
+
+
+def _stations(ground: dict[str, Any], own: dict[str, Any], protections: Sequence[str]) -> dict[str, GroundParams]:
+    """A station for each protection, by its text."""
+    from gbas_ground.ionosphere.section import NO_THREAT
+    from gbas_ground.params import GroundParams
+
     stations = {}
     for text in protections or (NO_THREAT, "own"):
         name, _, keys = text.partition(":")
@@ -116,30 +170,7 @@ def plan_of(
             ground | {"ionosphere": section | given, "station": dict(ground["station"]) | distance},
             source=f"--protection {text}",
         )
-    drawn = threat or own.get("threat_model", NO_THREAT)
-    if drawn not in THREATS:
-        raise GbasError(f"--threat {drawn!r} is not one of {', '.join(THREATS)}")
-    flight = replace(world.flight, intercept_distance_m=within_m + 1_000.0, level_time_s=_LEVEL_S)
-    shorter_s = round(world.length_s - flight.duration_s, 1)  # it ends when the scenario's does
-    return Plan(
-        world=replace(
-            world,
-            flight=flight,
-            systems=systems,
-            faults=(),
-            fronts=(),
-            duration_s=None,
-            interval_s=interval_s or world.interval_s,
-            start_tow_s=world.start_tow_s + shorter_s,
-        ),
-        stations=stations,
-        aircraft=AirborneParams.from_mapping(dict(sections["airborne"]) | {"systems": systems}),
-        threat=THREATS[drawn],
-        kinds=tuple(kinds or KINDS),
-        runs=runs,
-        within_m=within_m,
-        seed=seed,
-    )
+    return stations
 
 
 _LEVEL_S = 270.0  # filters on the ground and on board settle in 230 s

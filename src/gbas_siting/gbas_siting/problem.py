@@ -50,12 +50,15 @@ class SitingProblem:
         tuple[tuple[float, float], ...],
         Parameter("east and north of receivers that stay; none: the first is put at the origin", "m"),
     ] = ()
-    runway_bearing_rad: Annotated[float, Parameter("true bearing of the runway", "deg")] = 0.5 * math.pi
-    gradient_range: Annotated[tuple[float, float], Parameter("gradients to be detected, along the runway", "m/m")] = (
-        GRADIENT_RANGE
-    )
+    runway_bearing_rad: Annotated[float, Parameter("true bearing of the runway", "deg", -360.0, 360.0)] = 0.5 * math.pi
+    gradient_range: Annotated[
+        tuple[float, float], Parameter("gradients to be detected, along the runway", "m/m", 0.0, 1.0)
+    ] = GRADIENT_RANGE
     k: Annotated[
-        float, Parameter("standard deviations between a multiple of the wavelength and a detectable gradient")
+        float,
+        Parameter(
+            "standard deviations between a multiple of the wavelength and a detectable gradient", "-", 0.0, 100.0
+        ),
     ] = k_factor()
     baselines: Annotated[Baselines, Parameter("which baselines are monitored")] = "star"
     tolerance_m: Annotated[float, Parameter("placement tolerance along the runway", "m", 0.0)] = 0.0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gbas_core.ranging.smoothing import SmoothingParams, initial_smoothing, smooth_step
-from gbas_ground.ionosphere.range_error import DivergenceCredit, away_s, worst_range_error_m
+from gbas_ground.ionosphere.range_error import DivergenceCredit, TracedPoint, away_s, worst_range_error_m
 from gbas_ground.ionosphere.threat import THREATS, FrontThreat
 from gbas_sim.atmosphere.fronts import THREAT_SPACES
 
@@ -16,7 +16,9 @@ CREDIT = DivergenceCredit(threshold_mps=0.0233, margin_mps=3.719 * 0.00399, tau_
 
 def worst(x_m, v_mps, gradient=375e-6, tau_s=100.0, credit=None, threat=CONUS):
     return float(
-        worst_range_error_m(np.array(gradient), np.array([x_m, 0.0]), np.array([-v_mps, 0.0]), tau_s, threat, credit)
+        worst_range_error_m(
+            np.array(gradient), TracedPoint(np.array([x_m, 0.0]), np.array([-v_mps, 0.0])), tau_s, threat, credit
+        )
     )
 
 
@@ -132,7 +134,7 @@ def test_no_front_exceeds_the_bound():
     place_m, error, in_use = through_the_filters(x_m, v_mps, gradient, width_m, front, edge_m)
     offset = np.stack([place_m, np.zeros_like(place_m)], axis=-1)
     velocity = np.broadcast_to(np.stack([-v_mps, np.zeros(count)], axis=-1), offset.shape)
-    bound = worst_range_error_m(np.full(place_m.shape, 375e-6), offset, velocity, 100.0, CONUS, CREDIT)
+    bound = worst_range_error_m(np.full(place_m.shape, 375e-6), TracedPoint(offset, velocity), 100.0, CONUS, CREDIT)
     ratio = (error / bound)[in_use]
     assert ratio.size > 2.0 * count
     assert 0.9 < ratio.max() <= 1.0

@@ -25,7 +25,7 @@ from gbas_ground.corrections.sigma import MAX_SIGMA_M
 from gbas_ground.ionosphere.cases import Cases
 from gbas_ground.ionosphere.geometry_screening import judge, least_safe, sent_sigma_m, subsets_of
 from gbas_ground.ionosphere.places import Places
-from gbas_ground.ionosphere.range_error import worst_range_error_m
+from gbas_ground.ionosphere.range_error import TracedPoint, worst_range_error_m
 from gbas_ground.ionosphere.threat import FrontThreat
 from gbas_ground.param_checks import MIN_SERVICE_SATELLITES
 from gbas_ground.params import GroundParams
@@ -244,8 +244,7 @@ def range_errors_m(
     descent = (places.speed_mps * places.tan_gpa)[:, np.newaxis, np.newaxis]
     errors = worst_range_error_m(
         threat.largest_gradient(elevation_rad),
-        offset - height * traced,
-        forward + descent * traced,
+        TracedPoint(offset - height * traced, forward + descent * traced),
         tau_s,
         threat,
         places.credit,

@@ -28,7 +28,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -97,10 +97,24 @@ def _step(times: FloatArray) -> FloatArray:
     return np.asarray(1.0 - (1.0 + times) * np.exp(-times))
 
 
+class TracedPoint(NamedTuple):
+    """Where an aircraft's path to a satellite meets the station's plane.
+
+    Attributes
+    ----------
+    offset_m : (..., 2) array
+        From the station, east and north [m].
+    velocity_mps : (..., 2) array
+        Of that point [m/s].
+    """
+
+    offset_m: FloatArray
+    velocity_mps: FloatArray
+
+
 def worst_range_error_m(
     gradient: FloatArray,
-    offset_m: FloatArray,
-    velocity_mps: FloatArray,
+    traced: TracedPoint,
     tau_s: float,
     threat: FrontThreat,
     credit: DivergenceCredit | None,
@@ -113,10 +127,7 @@ def worst_range_error_m(
     ----------
     gradient : (...) array
         Largest gradient at the satellite's elevation [m/m].
-    offset_m : (..., 2) array
-        From the station to where the aircraft's path to the satellite meets the station's plane [m].
-    velocity_mps : (..., 2) array
-        Of that point [m/s].
+    traced : TracedPoint
     tau_s : float
         Time constant of the smoothing [s].
     threat : FrontThreat
@@ -135,6 +146,7 @@ def worst_range_error_m(
     Exact for the worst direction of a front that stands still. What fronts add that move is taken for an aircraft that
     flies straight in, from the next worse place of a table: an upper bound.
     """
+    offset_m, velocity_mps = traced
     past = offset_m - 2.0 * tau_s * velocity_mps
     still_m = np.hypot(past[..., 0], past[..., 1]) + radius_m
     distance = np.hypot(offset_m[..., 0], offset_m[..., 1]) / _DISTANCE_STEP_M

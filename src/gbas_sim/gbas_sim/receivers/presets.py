@@ -15,7 +15,7 @@ the surrogates of :mod:`gbas_core.models.error_models`. Correlation times are ou
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated, Final, Literal, get_args
+from typing import Annotated, Final, Literal, NamedTuple, get_args
 
 import numpy as np
 from pydantic import Field
@@ -227,8 +227,8 @@ def ground_receiver(
     own, common = _ground_targets(designator)
     thermal = _smoothed_thermal_m(model, interval_s)
     errors = (
-        _error("site multipath", own, thermal, multipath_s, interval_s, carrier_share=_CARRIER_SHARE),
-        _error("site", common, None, common_s, interval_s, shared=True),
+        _error("site multipath", own, thermal, _Times(multipath_s, interval_s), carrier_share=_CARRIER_SHARE),
+        _error("site", common, None, _Times(common_s, interval_s), shared=True),
     )
     return ReceiverModel(tracking=model.tracking, cn0=model.cn0, oscillator=model.oscillator, errors=errors)
 
@@ -267,8 +267,10 @@ def airborne_receiver(
     thermal = _smoothed_thermal_m(model, interval_s)
     multipath = (_airborne_sigma(AIRFRAME_MULTIPATH),) * 2 + (_airborne_sigma(L5_MULTIPATH_SURROGATE),)
     errors = (
-        _error("receiver noise", (noise, noise, _airborne_sigma(L5_NOISE_SURROGATE)), thermal, noise_s, interval_s),
-        _error("airframe multipath", multipath, None, multipath_s, interval_s, carrier_share=_CARRIER_SHARE),
+        _error(
+            "receiver noise", (noise, noise, _airborne_sigma(L5_NOISE_SURROGATE)), thermal, _Times(noise_s, interval_s)
+        ),
+        _error("airframe multipath", multipath, None, _Times(multipath_s, interval_s), carrier_share=_CARRIER_SHARE),
     )
     return ReceiverModel(tracking=model.tracking, cn0=model.cn0, oscillator=model.oscillator, errors=errors)
 
@@ -311,18 +313,24 @@ def _smoothed_thermal_m(model: ReceiverModel, interval_s: float) -> _Targets:
     return gain * sigma[:, L1, gps], gain * sigma[:, L1, galileo], gain * l5
 
 
+class _Times(NamedTuple):
+    """Correlation time of an error, and between epochs [s]."""
+
+    correlation_s: float
+    interval_s: float
+
+
 def _error(
     name: str,
     targets: _Targets,
     thermal: _Targets | None,
-    correlation_s: float,
-    interval_s: float,
+    times: _Times,
     *,
     shared: bool = False,
     carrier_share: float = 0.0,
 ) -> CorrelatedError:
     """The error that makes up, once smoothed, what thermal noise is short of the target."""
-    gain = smoothing_gain(correlation_s, tau_s=TAU_S, interval_s=interval_s)
+    gain = smoothing_gain(times.correlation_s, tau_s=TAU_S, interval_s=times.interval_s)
     curves = []
     for place, target in enumerate(targets):
         rest = target**2 - (0.0 if thermal is None else thermal[place] ** 2)
@@ -338,7 +346,7 @@ def _error(
     )
     return CorrelatedError(
         name=name,
-        correlation_s=correlation_s,
+        correlation_s=times.correlation_s,
         code=(code[0], code[1], code[2]),
         carrier=(carrier[0], carrier[1], carrier[2]),
         shared=shared,

@@ -14,7 +14,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -118,13 +118,23 @@ class _Sky:
     blind: dict[int, FloatArray]
 
 
+class Trials(NamedTuple):
+    """Monte Carlo runs of each epoch.
+
+    Each has a random gradient of the monitor's range on every satellite that is nobody's reference, and on one of each
+    constellation's references in turn.
+    """
+
+    random: np.random.Generator
+    repetitions: int = 1
+
+
 def study(
     elevation_rad: FloatArray,
     site: GradientSite,
     params: IonosphereGradientParams,
-    random: np.random.Generator,
+    trials: Trials,
     *,
-    repetitions: int = 1,
     bins_deg: Sequence[float] = BINS_DEG,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> list[Bin]:
@@ -136,10 +146,7 @@ def study(
         From :func:`elevations_of_a_day`.
     site : GradientSite
     params : IonosphereGradientParams
-    random : numpy.random.Generator
-    repetitions : int
-        Monte Carlo runs of each epoch: each has a random gradient of `params.gradient_range` on every satellite that
-        is nobody's reference, and on one of each constellation's references in turn.
+    trials : Trials
     bins_deg : sequence of float
         Ends of the bins.
     progress : callable
@@ -148,12 +155,12 @@ def study(
     counts: list[tuple[FloatArray | BoolArray, ...]] = []
     for number, row in enumerate(elevation_rad):
         sky = _sky(row, site, params)
-        for repetition in range(repetitions):
-            counts.append((row, sky.coverage, *_trial(sky, site, params, repetition, random)))
+        for repetition in range(trials.repetitions):
+            counts.append((row, sky.coverage, *_trial(sky, site, params, repetition, trials.random)))
         progress(number + 1, len(elevation_rad))
     elevation, coverage, tried, detected, covered, alarms = (np.array(each) for each in zip(*counts, strict=True))
     return [
-        _bin(low, high, np.degrees(elevation), coverage, tried, detected, covered, alarms, repetitions)
+        _bin(low, high, _Tally(np.degrees(elevation), coverage, tried, detected, covered, alarms), trials.repetitions)
         for low, high in itertools.pairwise(bins_deg)
     ]
 
@@ -219,17 +226,19 @@ def _within(gradient: float, intervals: FloatArray) -> bool:
     return bool(((gradient >= intervals[:, 0]) & (gradient <= intervals[:, 1])).any())
 
 
-def _bin(
-    low: float,
-    high: float,
-    elevation_deg: FloatArray,
-    coverage: FloatArray,
-    tried: BoolArray,
-    detected: BoolArray,
-    covered: BoolArray,
-    alarms: BoolArray,
-    repetitions: int,
-) -> Bin:
+class _Tally(NamedTuple):
+    """What came of all trials, ``(trials, N)`` each."""
+
+    elevation_deg: FloatArray
+    coverage: FloatArray
+    tried: BoolArray
+    detected: BoolArray
+    covered: BoolArray
+    alarms: BoolArray
+
+
+def _bin(low: float, high: float, tally: _Tally, repetitions: int) -> Bin:
+    elevation_deg, coverage, tried, detected, covered, alarms = tally
     inside = (elevation_deg >= low) & (elevation_deg < high)
     share = coverage[inside]
     return Bin(

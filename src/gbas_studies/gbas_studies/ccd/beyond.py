@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Sequence
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from scipy.optimize import brentq
@@ -30,7 +30,7 @@ from gbas_studies.ccd.injected import (
 )
 from gbas_studies.ccd.missed_detection import p_md
 from gbas_studies.ccd.monitors import P_FALSE_ALARM, Monitor, monitor_for
-from gbas_studies.ccd.rare_events import COLUMNS, Estimate, single_frequency, two_frequency
+from gbas_studies.ccd.rare_events import COLUMNS, Estimate, Sampling, single_frequency, two_frequency
 from gbas_studies.ccd.recorded import MonitoredSeries
 from gbas_studies.reproduction.drawing import COLOURS, new_figure
 from gbas_studies.reproduction.items import Claim, Item, Picture, Section
@@ -49,23 +49,23 @@ def rare_events(options: Options) -> Section:
     """False alarm and missed detection by importance sampling, beside the closed forms."""
     options.progress("importance sampling")
     samples = 4_000 if options.quick else 20_000
-    common: dict[str, Any] = {"samples": samples, "seed": options.seed, "params": GROUND}
+    sampling = Sampling(samples=samples, seed=options.seed, params=GROUND)
     items: list[Item] = []
-    false = single_frequency(0.0, GROUND_SIGMA_MPS, GROUND_THRESHOLD_MPS, alarm=True, **common)
+    false = single_frequency(0.0, GROUND_SIGMA_MPS, GROUND_THRESHOLD_MPS, sampling, alarm=True)
     silent = 1.0 - float(p_md(monitor_for("gast-d", "Code L1"), 0.0))
     items.append(_estimate("False alarm, GAST D, 0.0233 m/s on both sides", false, silent))
-    false = two_frequency(None, 0.0, NOISE_M, alarm=True, **common)
+    false = two_frequency(None, 0.0, NOISE_M, sampling, alarm=True)
     items.append(_estimate("False alarm, GAST F, sound", false, P_FALSE_ALARM))
     monitor = monitor_for("gast-d", "Code L1")
     for level in _LEVELS:
         rate = _rate_for(monitor, level)
-        missed = single_frequency(rate, GROUND_SIGMA_MPS, GROUND_THRESHOLD_MPS, alarm=False, **common)
+        missed = single_frequency(rate, GROUND_SIGMA_MPS, GROUND_THRESHOLD_MPS, sampling, alarm=False)
         items.append(_estimate(f"Missed detection, GAST D, {rate:.5f} m/s", missed, level))
     for mode in ("Code L1", "Carrier L5", "Code L5, Carrier L1"):
         watched = white_noise_monitor(mode)
         for level in _LEVELS:
             rate = _rate_for(watched, level)
-            missed = two_frequency(mode, rate, NOISE_M, alarm=False, **common)
+            missed = two_frequency(mode, rate, NOISE_M, sampling, alarm=False)
             items.append(_estimate(f"Missed detection, GAST F, sound, {mode}, {rate:.5f} m/s", missed, level))
     return Section(
         title="Beyond the paper: probabilities down to 1e-9 by importance sampling", items=items,

@@ -53,6 +53,16 @@ class Estimate:
         return cls(value=float(weighted.mean()), standard_error=spread, samples=len(weighted))
 
 
+@dataclass(frozen=True, kw_only=True)
+class Sampling:
+    """How a probability is estimated: random samples, each an epoch sequence through the filters of a monitor."""
+
+    samples: int
+    seed: int
+    params: DivergenceParams
+    interval_s: float = 0.5
+
+
 def _impulse_response(params: DivergenceParams, interval_s: float, epochs: int) -> FloatArray:
     """What noise of 1 m at each epoch adds to the last filtered rate, (epochs,) [1/s]."""
     alpha = interval_s / params.tau_s
@@ -87,9 +97,8 @@ def _epochs(params: DivergenceParams, interval_s: float) -> int:
 
 
 def single_frequency(
-    rate_mps: float, sigma_mps: float, threshold_mps: float, *, alarm: bool, samples: int, seed: int,
-    params: DivergenceParams, interval_s: float = 0.5,
-) -> Estimate:  # fmt: skip
+    rate_mps: float, sigma_mps: float, threshold_mps: float, sampling: Sampling, *, alarm: bool
+) -> Estimate:
     """Probability that the GAST D statistic exceeds its threshold on either side, or that it does not.
 
     Parameters
@@ -99,13 +108,12 @@ def single_frequency(
     sigma_mps : float
         Standard deviation of the settled statistic; the noise of code minus carrier is made so large [m/s].
     threshold_mps : float
+    sampling : Sampling
     alarm : bool
         True: probability of an alarm; False: that of none.
-    samples, seed : int
-    params : DivergenceParams
-    interval_s : float
     """
-    rng = np.random.default_rng(seed)
+    samples, params, interval_s = sampling.samples, sampling.params, sampling.interval_s
+    rng = np.random.default_rng(sampling.seed)
     epochs = _epochs(params, interval_s)
     noise_m = sigma_mps * interval_s / white_noise_gain(interval_s / params.tau_s)
     pulse = _impulse_response(params, interval_s, epochs)
@@ -127,9 +135,8 @@ def single_frequency(
 
 
 def two_frequency(
-    mode: str | None, d_mps: float, sigma_m: FloatArray, *, alarm: bool, samples: int, seed: int,
-    params: DivergenceParams, interval_s: float = 0.5, p_false_alarm: float = 1e-9,
-) -> Estimate:  # fmt: skip
+    mode: str | None, d_mps: float, sigma_m: FloatArray, sampling: Sampling, *, alarm: bool, p_false_alarm: float = 1e-9
+) -> Estimate:
     """The same for the sound GAST F form, with a known receiver clock.
 
     Parameters
@@ -140,14 +147,13 @@ def two_frequency(
         Its rate, in steady state [m/s].
     sigma_m : (4,) array
         White noise of code L1, code L5, carrier L1, carrier L5 [m].
+    sampling : Sampling
     alarm : bool
-    samples, seed : int
-    params : DivergenceParams
-    interval_s : float
     p_false_alarm : float
         Sets the threshold.
     """
-    rng = np.random.default_rng(seed)
+    samples, params, interval_s = sampling.samples, sampling.params, sampling.interval_s
+    rng = np.random.default_rng(sampling.seed)
     epochs = _epochs(params, interval_s)
     pulse = _impulse_response(params, interval_s, epochs)
     energy = float((pulse**2).sum())

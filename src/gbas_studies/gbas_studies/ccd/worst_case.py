@@ -185,10 +185,28 @@ def _at(values: FloatArray, rates_mps: FloatArray, found: Response, place: int) 
     return Worst(value=value, d_mps=float(rates_mps[row]), onset_s=float(found.offset_s[column]))
 
 
+@dataclass(frozen=True, kw_only=True)
+class Exclusion:
+    """What is looked at, and how it ends.
+
+    Attributes
+    ----------
+    error_on : {"L1", "L5", "IF"} or None
+        Ranges whose error counts; None: by the mode.
+    delay_s : float
+        From the monitor's alarm to the exclusion at the user [s].
+    receivers : int
+        Averaged by the monitor.
+    """
+
+    error_on: ErrorOn | None = None
+    delay_s: float = 0.0
+    receivers: int = 1
+
+
 def study(
-    mode: str, monitor: str, smoothing: Smoothing, grid: Grid, *, error_on: ErrorOn | None = None,
-    exclusion_delay_s: float = 0.0, receivers: int = 1,
-) -> tuple[Worst, Worst, Response]:  # fmt: skip
+    mode: str, monitor: str, smoothing: Smoothing, grid: Grid, exclusion: Exclusion | None = None
+) -> tuple[Worst, Worst, Response]:
     """Worst undetected error and smallest mapping of one mode on a grid, and the responses behind them.
 
     Raises
@@ -196,10 +214,11 @@ def study(
     StudyError
         For an unknown mode or monitor, and a grid that does not fit the samples.
     """
-    watched = monitor_for(monitor, mode, error_on=error_on, receivers=receivers)
+    exclusion = Exclusion() if exclusion is None else exclusion
+    watched = monitor_for(monitor, mode, error_on=exclusion.error_on, receivers=exclusion.receivers)
     found = response(
-        mode, watched, smoothing, grid.offsets(smoothing.interval_s), error_on=error_on,
-        exclusion_delay_s=exclusion_delay_s,
+        mode, watched, smoothing, grid.offsets(smoothing.interval_s), error_on=exclusion.error_on,
+        exclusion_delay_s=exclusion.delay_s,
     )  # fmt: skip
     rates = grid.rates_mps()
     return worst_error(found, rates), smallest_mapping(found, rates), found

@@ -84,16 +84,35 @@ def slope_error_s(start: FloatArray, sample: FloatArray, smoothing: Smoothing) -
     return 2.0 * smoothed_cmc_s(start, sample, smoothing) - grown
 
 
+@dataclass(frozen=True, kw_only=True)
+class Encounter:
+    """Aircraft and site that a front may meet.
+
+    Attributes
+    ----------
+    farthest_m : float
+        The aircraft is within this distance of the reference point when its error passes the limit [m].
+    speeds_mps : sequence of float
+        Of aircraft [m/s].
+    limit_m : float
+    site_radius_m : float
+        The first antenna is so far before the reference point, and no other farther behind it [m].
+    acquiring : bool
+        Aircraft may have acquired the satellite on the slope; otherwise their filters have settled before it.
+    """
+
+    farthest_m: float = THRESHOLD_M + APPROACH_M
+    speeds_mps: Sequence[float] = SPEEDS_MPS
+    limit_m: float = IONOSPHERE_LIMIT_M
+    site_radius_m: float = SITE_RADIUS_M
+    acquiring: bool = True
+
+
 def front_limit(
     gradient: float,
     front_mps: float,
     smoothing: Smoothing,
-    *,
-    farthest_m: float = THRESHOLD_M + APPROACH_M,
-    speeds_mps: Sequence[float] = SPEEDS_MPS,
-    limit_m: float = IONOSPHERE_LIMIT_M,
-    site_radius_m: float = SITE_RADIUS_M,
-    acquiring: bool = True,
+    encounter: Encounter | None = None,
 ) -> FrontLimit:
     """The earliest passing of the limit over all aircraft within a distance, whenever the front met them.
 
@@ -105,39 +124,30 @@ def front_limit(
         Speed of the front along the approach; faster than all aircraft [m/s].
     smoothing : Smoothing
         Of both ends; users' filters are at least the delay to incorporation old.
-    farthest_m : float
-        The aircraft is within this distance of the reference point when its error passes the limit [m].
-    speeds_mps : sequence of float
-        Of aircraft [m/s].
-    limit_m : float
-    site_radius_m : float
-        The first antenna is so far before the reference point, and no other farther behind it [m].
-    acquiring : bool
-        Aircraft may have acquired the satellite on the slope; otherwise their filters have settled before it.
+    encounter : Encounter, optional
 
     Raises
     ------
     StudyError
         When an aircraft is not slower than the front: it is never overtaken.
     """
+    encounter = Encounter() if encounter is None else encounter
+    speeds_mps = encounter.speeds_mps
     if not (gradient > 0.0 and speeds_mps and front_mps > max(speeds_mps)):
         raise StudyError(
             f"front of {gradient:g} m/m at {front_mps:g} m/s: both above 0, and faster than every aircraft"
         )
-    older = _OLDER if acquiring else ()
-    found = [
-        _limit_of(gradient, front_mps, speed, smoothing, older, farthest_m, limit_m, site_radius_m)
-        for speed in speeds_mps
-    ]
+    found = [_limit_of(gradient, front_mps, speed, smoothing, encounter) for speed in speeds_mps]
     return min(found, key=lambda each: each.since_touch_s)
 
 
 def _limit_of(
-    gradient: float, front_mps: float, speed_mps: float, smoothing: Smoothing, older: tuple[float, ...],
-    farthest_m: float, limit_m: float, radius_m: float,
-) -> FrontLimit:  # fmt: skip
+    gradient: float, front_mps: float, speed_mps: float, smoothing: Smoothing, encounter: Encounter
+) -> FrontLimit:
     """Of aircraft of one speed, over how long the front has had them and the starts of their filters."""
     interval_s, gain_mps = smoothing.interval_s, front_mps - speed_mps
+    farthest_m, radius_m = encounter.farthest_m, encounter.site_radius_m
+    older = _OLDER if encounter.acquiring else ()
     on_slope = np.arange(0.0, round(_LONGEST_S / interval_s) + 1.0)
     starts = np.array([on_slope - smoothing.updates - each for each in older] + [np.full_like(on_slope, LONG_BEFORE)])
     error_m = gradient * gain_mps * slope_error_s(starts, on_slope, smoothing)  # (starts, on_slope)
@@ -146,7 +156,7 @@ def _limit_of(
     station_m = _station_error_m(gradient * front_mps, 2.0 * radius_m / front_mps, smoothing)
     passing_s = np.minimum(
         *(
-            _first_beyond_s(each, at_farthest_s, station_m, interval_s, limit_m)
+            _first_beyond_s(each, at_farthest_s, station_m, interval_s, encounter.limit_m)
             for each in (error_m.min(axis=0), error_m.max(axis=0))
         )
     )

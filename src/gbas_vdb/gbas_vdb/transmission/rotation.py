@@ -110,29 +110,28 @@ def _sent(known: SourceHistory, frame: int) -> SourceHistory:
 
 def _next(history: Mapping[int, SourceHistory], chosen: Sequence[int], frame: int, places: int) -> tuple[int, bool]:
     waiting = sorted((source for source in history if source not in chosen), key=lambda s: (history[s].due, s))
+    others = {source: [other for other in waiting if other != source] for source in waiting}
     for source in waiting:
-        if history[source].changed and _others_keep_limit(history, waiting, chosen, source, frame, places, 3):
+        if history[source].changed and _others_keep_limit(history, others[source], chosen, frame, places, 3):
             return source, True
     for source in waiting:
-        if not history[source].sent and _others_keep_limit(history, waiting, chosen, source, frame, places, 1):
+        if not history[source].sent and _others_keep_limit(history, others[source], chosen, frame, places, 1):
             return source, False
     return waiting[0], False
 
 
 def _others_keep_limit(
     history: Mapping[int, SourceHistory],
-    waiting: Sequence[int],
+    others: Sequence[int],
     chosen: Sequence[int],
-    source: int,
     frame: int,
     places: int,
     frames_taken: int,
 ) -> bool:
-    """Whether the others, sent in the order of their limits, all keep them when `source` takes a place for some frames.
+    """Whether the others, sent in the order of their limits, all keep them when a source takes a place for some frames.
 
     A run in progress has its place until it ends.
     """
-    others = [other for other in waiting if other != source]
     position = 0
     ahead = 0
     while position < len(others):

@@ -8,7 +8,7 @@ it. The aircraft answers late: each control leads by its lag times the rate it h
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, Self
+from typing import Final, NamedTuple, Self
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -140,14 +140,23 @@ def wanted_acceleration(
     )
 
 
+class AirState(NamedTuple):
+    """How the aircraft flies now, ``(...)`` arrays: motion through the air [m/s], [rad], attitude [rad], mass [kg]."""
+
+    airspeed_mps: FloatArray
+    climb_rad: FloatArray
+    heading_rad: FloatArray
+    bank_rad: FloatArray
+    alpha_rad: FloatArray
+    mass_kg: FloatArray
+
+
 def command(
     aircraft: Aircraft,
     where: Place,
     made: Forces,
     acceleration_mps2: Vector,
-    motion: tuple[FloatArray, FloatArray, FloatArray],
-    attitude: tuple[FloatArray, FloatArray],
-    mass_kg: FloatArray,
+    flown: AirState,
     wanted: Wanted,
 ) -> Command:
     """Controls for an acceleration over the ground, within the aircraft's limits.
@@ -160,26 +169,22 @@ def command(
         Those that act now.
     acceleration_mps2 : three (...) arrays
         Wanted, east, north, up.
-    motion : three (...) arrays
-        Airspeed, climb angle and heading.
-    attitude : pair of (...) arrays
-        Bank and angle of attack.
-    mass_kg : (...) array
+    flown : AirState
     wanted : Wanted
     """
-    limits, (bank, alpha) = aircraft.limits, attitude
-    along, right, above = required_force(acceleration_mps2, where, motion[1], motion[2])
+    limits, bank, alpha, mass_kg = aircraft.limits, flown.bank_rad, flown.alpha_rad, flown.mass_kg
+    along, right, above = required_force(acceleration_mps2, where, flown.climb_rad, flown.heading_rad)
     # The lift is made for the bank there is: while rolling it must not push up or down.
     normal = np.minimum(
         np.maximum(above * np.cos(bank) + right * np.sin(bank), limits.load_factor_min * STANDARD_GRAVITY_MPS2),
         limits.load_factor_max * STANDARD_GRAVITY_MPS2,
     )
-    dynamic = aircraft.dynamic_force_n(motion[0], where.air)
+    dynamic = aircraft.dynamic_force_n(flown.airspeed_mps, where.air)
     lift = (mass_kg * normal - made.thrust_n * np.sin(alpha)) / dynamic
     alpha_wanted = aircraft.alpha_rad(lift, wanted.landing) + wanted.lead[1]
     alpha_most = aircraft.alpha_rad(aircraft.coefficient("lift_max", wanted.landing), wanted.landing)
     bank_wanted = np.arctan2(right, above) + wanted.lead[0]
-    least, largest, _ = aircraft.pull_bounds_n(motion[0], where.air)
+    least, largest, _ = aircraft.pull_bounds_n(flown.airspeed_mps, where.air)
     pull = mass_kg * along + made.drag_n - made.thrust_n * np.cos(alpha) + made.pull_n + wanted.lead[2]
     return Command(
         bank_rad=np.minimum(np.maximum(bank_wanted, -limits.bank_rad), limits.bank_rad),

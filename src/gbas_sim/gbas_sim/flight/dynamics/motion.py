@@ -25,7 +25,7 @@ from gbas_sim.flight.dynamics.equations import (
     place,
     position_rates,
 )
-from gbas_sim.flight.dynamics.guidance import Command, Wanted, command, wanted_acceleration, wanted_table
+from gbas_sim.flight.dynamics.guidance import AirState, Command, Wanted, command, wanted_acceleration, wanted_table
 from gbas_sim.flight.dynamics.reference import Reference
 from gbas_sim.flight.dynamics.trim import Trim
 
@@ -82,11 +82,17 @@ class Model:
 
     def command(self, state: FloatArray, where: Place, made: Forces, wanted: Wanted) -> Command:
         """What guidance asks for."""
-        moved, mass = (state[State.LATITUDE], state[State.LONGITUDE]), state[State.MASS]
+        moved = state[State.LATITUDE], state[State.LONGITUDE]
         acceleration = wanted_acceleration(wanted, moved, state[State.HEIGHT], where, self.aircraft.response)
-        motion = (state[State.AIRSPEED], state[State.CLIMB], state[State.HEADING])
-        attitude = (state[State.BANK], state[State.ALPHA])
-        return command(self.aircraft, where, made, acceleration, motion, attitude, mass, wanted)
+        flown = AirState(
+            airspeed_mps=state[State.AIRSPEED],
+            climb_rad=state[State.CLIMB],
+            heading_rad=state[State.HEADING],
+            bank_rad=state[State.BANK],
+            alpha_rad=state[State.ALPHA],
+            mass_kg=state[State.MASS],
+        )
+        return command(self.aircraft, where, made, acceleration, flown, wanted)
 
     def rates(self, state: FloatArray, wanted: Wanted) -> FloatArray:
         """Rates of states (N_STATES, ...) under guidance."""
