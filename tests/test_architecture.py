@@ -244,7 +244,7 @@ _CAMPAIGN = "open: to be split when campaigns are distributed"
 TOO_LARGE: dict[str, str] = {
     "gbas_core/ranging/divergence.py:_advanced": _EPOCH,
     "gbas_core/ranging/slips.py": _EPOCH,
-    "gbas_ground/consistency.py:readmission_state": "open: needs a record of what monitors say, from the stage that asks",
+    "gbas_ground/consistency.py:readmission_state": "open: needs a record of what monitors say, from the stage asking",
     "gbas_ground/monitors/carrier_acceleration.py": _EPOCH,
     "gbas_ground/monitors/carrier_acceleration.py:_statistics": _EPOCH,
     "gbas_ground/monitors/carrier_acceleration.py:carrier_acceleration_step": _EPOCH,

@@ -51,7 +51,7 @@ def test_critical_mapping_just_touches_the_requirement():
     margin = norm.cdf((limit - mapping * error_m) / SIGMA) / required_p_md(error_m)
     assert margin.max() == pytest.approx(1.0, abs=1e-4)
     assert error_m[margin.argmax()] == pytest.approx(decisive_m, abs=2e-3)
-    for form, freedom in (("paper", 4), ("sound", 3)):
+    for form, freedom in (("published", 4), ("full_rank", 3)):
         for power in (1, 2):
             mapping, _ = critical_mapping_gast_f(form, 1e-9, power=power)
             missed = ncx2.cdf(chi2.isf(1e-9, freedom), freedom, mapping * error_m**power)

@@ -27,7 +27,7 @@ from gbas_studies.ccd.recorded import (
     monitor_set,
 )
 
-LIMIT = threshold("sound", 1e-9)
+LIMIT = threshold("full_rank", 1e-9)
 
 
 def single_alarms(seen):
@@ -37,7 +37,7 @@ def single_alarms(seen):
 @pytest.mark.parametrize("chosen", [PAIR_L1L5, SPIRENT_L1L5], ids=["pair", "spirent"])
 def test_no_false_alarm_at_1_hz(chosen, data_dir):
     seen = monitor_set(chosen, data_dir, SHORT_SETTLE)
-    assert np.isfinite(seen.sound).sum() > 1000
+    assert np.isfinite(seen.full_rank).sum() > 1000
     assert single_alarms(seen) == 0
     assert not seen.alarms["gast-f-sound"].any()  # even with the covariance of a multipath limiting antenna
     metric, _ = cross_validated(seen)
@@ -68,7 +68,7 @@ def test_an_hour_of_two_receivers(data_dir):
     metric, fewest = cross_validated(seen)
     assert fewest > 200.0
     assert np.nanmax(metric) < LIMIT
-    assert np.isnan(seen.paper).all()  # its covariance is of L1 and L5
+    assert np.isnan(seen.published).all()  # its covariance is of L1 and L5
 
 
 def storm_part(number, data_dir, hours):
@@ -87,13 +87,13 @@ def test_the_storm_trips_one_frequency_and_not_two(data_dir):
     storm = storm_part(0, data_dir, (19.5, 22.5))
     assert storm.alarms["gast-d L1"].any(axis=0).sum() >= 2
     assert storm.alarms["gast-d L2"].any(axis=0).sum() >= 5
-    assert np.isfinite(storm.sound).sum() > 1000
+    assert np.isfinite(storm.full_rank).sum() > 1000
     assert not storm.alarms["gast-f-sound"].any()
 
 
 def test_a_quiet_day_trips_nothing(data_dir):
     quiet = storm_part(2, data_dir, (19.5, 22.5))
-    assert np.isfinite(quiet.sound).sum() > 1000
+    assert np.isfinite(quiet.full_rank).sum() > 1000
     assert not any(alarm.any() for alarm in quiet.alarms.values())
 
 
@@ -103,7 +103,7 @@ def test_whole_days_of_the_storm(number, data_dir):
     seen = monitor_set(STORM_SETS[number], data_dir, STORM_FILTERS)
     tripped = int((seen.alarms["gast-d L1"] | seen.alarms["gast-d L2"]).any(axis=0).sum())
     assert tripped >= 10 if number < 2 else tripped == 0
-    assert np.isfinite(seen.sound).sum() > 15_000
+    assert np.isfinite(seen.full_rank).sum() > 15_000
     assert not seen.alarms["gast-f-sound"].any()
 
 
@@ -126,5 +126,5 @@ def test_streams_with_gaps_are_survived(name, lost, longest_s, data_dir):
     for place in np.flatnonzero(gaps_s > SHORT_SETTLE.max_gap_s) + 1:
         assert not counts[place : place + 207].any()
     assert counts.sum() > 400
-    assert np.isnan(seen.sound).all()
+    assert np.isnan(seen.full_rank).all()
     assert not any(alarm.any() for alarm in seen.alarms.values())

@@ -15,7 +15,7 @@ from gbas_core.satellites import N_SATS
 from gbas_core.signals import L1, L2, L5, N_BANDS, SPEED_OF_LIGHT_MPS
 from gbas_ground.monitors.ccd_f import TwoFrequencyInput, TwoFrequencyParams, initial_two_frequency, two_frequency_step
 from gbas_ground.monitors.divergence_covariance import PRINTED_COVARIANCE, StatisticCovariance
-from gbas_ground.monitors.divergence_forms import sound_form, threshold
+from gbas_ground.monitors.divergence_forms import full_rank_form, threshold
 
 T_S = 0.5
 SEEN = (0, 3, 7, 12, 20, 33, 40, 50, 60)  # five GPS and four Galileo satellites
@@ -116,8 +116,8 @@ def test_steady_state_of_each_mode_is_eq_17(mode):
     # The printed coefficients are rounded to 0.01 (3.53 for 3.5212).
     assert result.mean_mps[:, FAULTY] == pytest.approx(printed, abs=0.02 * 0.021)
     assert result.mean_mps[:, FAULTY] == pytest.approx(combination_matrix(L1, L5) @ world.fault, abs=1e-5)
-    assert result.sound.failed[FAULTY]
-    assert result.paper.failed[FAULTY]
+    assert result.full_rank.failed[FAULTY]
+    assert result.published.failed[FAULTY]
 
 
 @pytest.mark.parametrize(
@@ -143,7 +143,7 @@ def test_a_fault_that_is_not_detected_shows_on_the_others_as_the_papers_mean_has
     result = run(world, epochs=STEADY)
     d_if = combination_matrix(L1, L5)[3] @ world.fault
     gps = [s for s in GROUPS[0] if s != FAULTY]
-    assert not result.sound.failed.any()
+    assert not result.full_rank.failed.any()
     assert result.mean_mps[3, FAULTY] == pytest.approx(d_if, rel=1e-3)
     assert result.mean_mps[3, gps] == pytest.approx(np.full(4, -d_if / 4.0), rel=1e-3)
     assert result.mean_mps[3, GROUPS[1]] == pytest.approx(np.zeros(4), abs=1e-6)
@@ -152,7 +152,7 @@ def test_a_fault_that_is_not_detected_shows_on_the_others_as_the_papers_mean_has
 def test_a_fault_that_is_detected_stays_with_its_satellite():
     world = World(fault=(0.0, 0.0, 0.4, 0.0))
     results, _ = run(world, epochs=STEADY, keep=True)
-    failed = np.array([each.sound.failed for each in results])
+    failed = np.array([each.full_rank.failed for each in results])
     assert np.flatnonzero(failed.any(axis=0)).tolist() == [FAULTY]
     assert failed[60:, FAULTY].all()
     d_if = combination_matrix(L1, L5)[3] @ world.fault
@@ -168,7 +168,7 @@ def test_two_faults_at_once_stay_with_their_satellites():
 
     params = TwoFrequencyParams(filters=QUICK.filters, min_clock_satellites=2)
     result = run(World(), params=params, epochs=STEADY, change=change)
-    assert np.flatnonzero(result.sound.failed).tolist() == [0, 50]
+    assert np.flatnonzero(result.full_rank.failed).tolist() == [0, 50]
 
 
 def test_suspicion_falls_on_the_fault_though_others_with_smaller_sigmas_pass_first():
@@ -180,10 +180,10 @@ def test_suspicion_falls_on_the_fault_though_others_with_smaller_sigmas_pass_fir
 
     clock = (0.04, 0.04, 0.04, 0.04)  # on the IF carrier alone
     results, _ = run(World(fault=clock), params=params, epochs=STEADY, change=change, keep=True)
-    failed = np.array([each.sound.failed for each in results])
+    failed = np.array([each.full_rank.failed for each in results])
     assert not np.delete(failed, FAULTY, axis=1).any()
     expected = (0.04 / (10.0 * np.sqrt(0.0724e-5 * 1.25))) ** 2  # the printed variance, four satellites in the clock
-    assert results[-1].sound.statistic[FAULTY] == pytest.approx(expected, rel=0.05)
+    assert results[-1].full_rank.statistic[FAULTY] == pytest.approx(expected, rel=0.05)
 
 
 def test_a_code_fault_leaves_the_clocks_alone():
@@ -192,7 +192,7 @@ def test_a_code_fault_leaves_the_clocks_alone():
         seen["carrier_m"][:, :, 3] += 0.001 * T_S * number  # the largest carrier rate, and no fault
 
     result = run(World(), epochs=STEADY, change=change)
-    assert np.flatnonzero(result.sound.failed).tolist() == [20]
+    assert np.flatnonzero(result.full_rank.failed).tolist() == [20]
     assert result.clock_satellites[[0, 3, 20]].tolist() == [4.0, 4.0, 4.0]
 
 
@@ -202,7 +202,7 @@ def test_too_few_for_a_verdict_without_the_suspect_fail_together():
         seen["carrier_m"][..., GROUPS[0]] = np.nan
 
     result = run(World(), epochs=STEADY, change=change)
-    assert np.flatnonzero(result.sound.failed).tolist() == GROUPS[1]
+    assert np.flatnonzero(result.full_rank.failed).tolist() == GROUPS[1]
 
 
 def test_the_clock_is_that_of_both_constellations_where_suspects_leave_too_few():
@@ -210,7 +210,7 @@ def test_the_clock_is_that_of_both_constellations_where_suspects_leave_too_few()
         seen["carrier_m"][:, L1, 50] += 0.2 * T_S * number
 
     result = run(World(), epochs=STEADY, change=change)
-    assert np.flatnonzero(result.sound.failed).tolist() == [50]
+    assert np.flatnonzero(result.full_rank.failed).tolist() == [50]
     assert result.clock_satellites[[33, 50]].tolist() == [7.0, 3.0]  # two of its own and five of GPS
 
 
@@ -222,7 +222,7 @@ def test_a_minority_of_faults_leaves_the_others_alone(faulty):
         seen["carrier_m"][:, :, list(faulty)] += 0.02 * T_S * number
 
     results, _ = run(World(), epochs=STEADY, change=change, keep=True)
-    failed = np.array([each.sound.failed for each in results])
+    failed = np.array([each.full_rank.failed for each in results])
     assert np.flatnonzero(failed.any(axis=0)).tolist() == list(faulty)
     assert failed[-1, list(faulty)].all()
 
@@ -243,7 +243,7 @@ def test_faults_of_all_satellites_are_not_explained_away():
         seen["code_m"][:, L1] += 0.2 * T_S * number  # on every code of L1
 
     result = run(World(), epochs=STEADY, change=change)
-    assert result.sound.failed[list(SEEN)].all()
+    assert result.full_rank.failed[list(SEEN)].all()
 
 
 def test_a_gap_is_bridged_without_the_clock():
@@ -283,7 +283,7 @@ def test_rebasing_at_every_epoch_blinds_nobody():
 
     result = run(world, epochs=200, change=change)
     assert result.receivers[FAULTY] == 0
-    assert not np.isfinite(result.sound.statistic[FAULTY])
+    assert not np.isfinite(result.full_rank.statistic[FAULTY])
 
 
 @pytest.mark.parametrize("band", [L1, L5])
@@ -311,8 +311,8 @@ def test_too_few_satellites_for_a_clock():
 def test_unmonitored_is_not_failed_and_not_passed():
     result = run(World(), params=TwoFrequencyParams(), epochs=100)
     assert (result.receivers == 0).all()
-    assert np.isnan(result.sound.statistic).all()
-    assert not result.sound.failed.any()
+    assert np.isnan(result.full_rank.statistic).all()
+    assert not result.full_rank.failed.any()
 
 
 def test_without_elevation_there_is_no_troposphere_and_no_monitoring():
@@ -322,14 +322,14 @@ def test_without_elevation_there_is_no_troposphere_and_no_monitoring():
 
     result = run(World(), change=change)
     assert (result.receivers == 0).all()
-    assert np.isnan(result.sound.statistic).all()
+    assert np.isnan(result.full_rank.statistic).all()
 
 
 def test_thresholds():
     # ENC 2015, after table 3; chi-square with 3 degrees of freedom from scipy.
-    assert threshold("paper", 1e-9) == pytest.approx(47.8795, abs=5e-5)
-    assert threshold("sound", 1e-9) == pytest.approx(chi2.isf(1e-9, 3), rel=1e-12)
-    assert threshold("sound", 1e-9) == pytest.approx(44.84, abs=5e-3)
+    assert threshold("published", 1e-9) == pytest.approx(47.8795, abs=5e-5)
+    assert threshold("full_rank", 1e-9) == pytest.approx(chi2.isf(1e-9, 3), rel=1e-12)
+    assert threshold("full_rank", 1e-9) == pytest.approx(44.84, abs=5e-3)
 
 
 def test_forms_are_quadratic_forms_of_the_means():
@@ -338,16 +338,16 @@ def test_forms_are_quadratic_forms_of_the_means():
     inverse = np.linalg.pinv(PRINTED_COVARIANCE)
     for satellite in SEEN:
         x = result.mean_mps[:, satellite]
-        assert result.paper.statistic[satellite] == pytest.approx(3.0 * x @ inverse @ x, rel=1e-9)
+        assert result.published.statistic[satellite] == pytest.approx(3.0 * x @ inverse @ x, rel=1e-9)
         q = result.covariance[satellite]
         distance = mahalanobis(x[[0, 1, 3]], np.zeros(3), np.linalg.inv(q))
-        assert result.sound.statistic[satellite] == pytest.approx(distance**2, rel=1e-9)
+        assert result.full_rank.statistic[satellite] == pytest.approx(distance**2, rel=1e-9)
 
 
 def test_covariance_of_one_satellite_does_not_touch_another():
     rates = np.ones((3, 2))
     covariance = np.stack([np.eye(3), np.full((3, 3), np.nan)])
-    assert sound_form(rates, covariance) == pytest.approx([3.0, np.nan], nan_ok=True)
+    assert full_rank_form(rates, covariance) == pytest.approx([3.0, np.nan], nan_ok=True)
 
 
 def test_more_receivers_make_independent_noise_smaller():

@@ -5,10 +5,10 @@ the ionosphere-free carrier (IF), from which geometry, satellite clock, troposph
 rates are filtered as for GAST D and averaged over receivers, and a quadratic form of the means is compared with a
 quantile of chi-square. Two forms run side by side:
 
-- *paper* (L1 and L5 only): four statistics, with ionosphere-free code minus carrier, the printed covariance and its
+- *published* (L1 and L5 only): four statistics, with ionosphere-free code minus carrier, the printed covariance and its
   pseudo-inverse, 4 degrees of freedom, threshold 47.8795. The fourth is a combination of the first two, and the printed
   covariance has a negative eigenvalue (-6.2e-11 (m/s)^2): the form is kept so that the paper can be reproduced.
-- *sound*: DF, DF, IF carrier with a covariance of their own (:mod:`~.divergence_covariance`), 3 degrees of freedom,
+- *full_rank*: DF, DF, IF carrier with a covariance of their own (:mod:`~.divergence_covariance`), 3 degrees of freedom,
   threshold 44.84.
 
 A divergence like the ionosphere's, (1, gamma, -1, -gamma) on codes and carriers, is invisible to both, on purpose.
@@ -61,8 +61,8 @@ from gbas_ground.monitors.divergence_covariance import (
 from gbas_ground.monitors.divergence_forms import (
     DEGREES_OF_FREEDOM,
     Form,
-    paper_form,
-    sound_form,
+    full_rank_form,
+    published_form,
     threshold,
     with_iono_free_code,
 )
@@ -174,7 +174,7 @@ class TwoFrequencyParams:
         """Of one source in 15 s, by the form that excludes: 1.9e-8 for 1e-9 an epoch and filters of 30 s."""
         if self.exclude == "none":
             return 0.0
-        form: Form = "paper" if self.exclude == "published" else "sound"
+        form: Form = "published" if self.exclude == "published" else "full_rank"
         limit = math.sqrt(threshold(form, self.p_false_alarm))
         return exposure_probability(limit, least_correlation(tau_s), freedom=DEGREES_OF_FREEDOM[form])
 
@@ -257,8 +257,8 @@ class TwoFrequencyEpoch:
     clock_satellites : (N,) array
         Fewest satellites behind the clock of a receiver averaged.
     covariance : (N, 3, 3) array
-        Of the sound form's means [(m/s)^2].
-    paper, sound : MonitorResult
+        Of the full-rank form's means [(m/s)^2].
+    published, full_rank : MonitorResult
         ``(N,)``: quadratic form against its threshold [-].
     """
 
@@ -268,8 +268,8 @@ class TwoFrequencyEpoch:
     receivers: FloatArray
     clock_satellites: FloatArray
     covariance: FloatArray
-    paper: MonitorResult
-    sound: MonitorResult
+    published: MonitorResult
+    full_rank: MonitorResult
 
 
 def initial_two_frequency(params: TwoFrequencyParams, n_receivers: int) -> TwoFrequencyState:
@@ -308,7 +308,7 @@ def two_frequency_step(
     suspect = np.zeros(N_SATS, dtype=bool)
     result = _judged(code_rates, carrier_rate, counts, suspect, epoch, params)
     in_clock = np.logical_or.reduce(epoch.clock_used, axis=0)  # what is in no clock disturbs none
-    if (result.sound.failed & in_clock).any():
+    if (result.full_rank.failed & in_clock).any():
         apart = _apart(result, carrier_rate, counts, epoch, params)
         if apart.any():
             without = _judged(code_rates, carrier_rate, counts, apart, epoch, params)
@@ -316,7 +316,7 @@ def two_frequency_step(
                 suspect, result = apart, without
     for group in CLOCK_GROUPS & in_clock:
         for _ in range(_MOST_SUSPECTS):
-            if not (result.sound.failed & group & ~suspect).any():
+            if not (result.full_rank.failed & group & ~suspect).any():
                 break
             more = suspect | _most_deviant(result, group & ~suspect)
             without = _judged(code_rates, carrier_rate, counts, more, epoch, params)
@@ -336,12 +336,12 @@ def _apart(
     there = np.isfinite(deviation)
     mean = np.where(there, deviation, 0.0).sum(axis=0) / np.maximum(there.sum(axis=0), 1)
     variance = result.covariance[:, 2, 2]
-    return np.asarray(mean**2 > _SUSPICION**2 * threshold("sound", params.p_false_alarm) * variance)
+    return np.asarray(mean**2 > _SUSPICION**2 * threshold("full_rank", params.p_false_alarm) * variance)
 
 
 def _explains(without: TwoFrequencyEpoch, result: TwoFrequencyEpoch, rest: BoolArray, share: float) -> bool:
     """Whether it was the clock: all that failed can be judged, and of what the rest had too much a share is left."""
-    judged = np.isfinite(without.sound.statistic[result.sound.failed]).all()
+    judged = np.isfinite(without.full_rank.statistic[result.full_rank.failed]).all()
     return bool(judged and _excess(without, rest) <= share * _excess(result, rest))
 
 
@@ -354,7 +354,7 @@ def _most_deviant(result: TwoFrequencyEpoch, candidates: BoolArray) -> BoolArray
 
 def _excess(result: TwoFrequencyEpoch, satellites: BoolArray) -> float:
     """Sum of the failed metrics of some satellites."""
-    return float(result.sound.statistic[result.sound.failed & satellites].sum())
+    return float(result.full_rank.statistic[result.full_rank.failed & satellites].sum())
 
 
 def _judged(
@@ -387,16 +387,18 @@ def _judged(
         receivers=receivers,
         clock_satellites=np.where(receivers > 0, n_clock, np.nan),
         covariance=covariance,
-        paper=_paper(means, receivers, params),
-        sound=upper_limit(sound_form(rates, covariance), threshold("sound", params.p_false_alarm), receivers > 0),
+        published=_published(means, receivers, params),
+        full_rank=upper_limit(
+            full_rank_form(rates, covariance), threshold("full_rank", params.p_false_alarm), receivers > 0
+        ),
     )
 
 
-def _paper(means_mps: FloatArray, receivers: FloatArray, params: TwoFrequencyParams) -> MonitorResult:
+def _published(means_mps: FloatArray, receivers: FloatArray, params: TwoFrequencyParams) -> MonitorResult:
     """The paper's form, for L1 and L5 alone: its covariance is of these, and so singular only with their ratio."""
     applies = (receivers > 0) & ((params.band, params.other) == (L1, L5))
-    statistic = np.where(applies, paper_form(means_mps, receivers), np.nan)
-    return upper_limit(statistic, threshold("paper", params.p_false_alarm), applies)
+    statistic = np.where(applies, published_form(means_mps, receivers), np.nan)
+    return upper_limit(statistic, threshold("published", params.p_false_alarm), applies)
 
 
 def _divergence_free(epoch: TwoFrequencyInput, params: TwoFrequencyParams) -> FloatArray:
@@ -488,7 +490,7 @@ def _step(state: TwoFrequencyState, epoch: MonitoredEpoch) -> tuple[TwoFrequency
         clock_used=inputs.usable,
     )
     state, found = two_frequency_step(state, given, inputs.dt_s, params)
-    forms = {"full_rank": found.sound, "published": found.paper}
+    forms = {"full_rank": found.full_rank, "published": found.published}
     due = inputs.due & (found.receivers > 0)
     signal = Signal.L1_L5 if params.other == L5 else Signal.L1_L2
     satellites: tuple[Verdict, ...] = ()
@@ -503,7 +505,7 @@ def _step(state: TwoFrequencyState, epoch: MonitoredEpoch) -> tuple[TwoFrequency
 
 def _likeliest_mode(epoch: TwoFrequencyEpoch, due: BoolArray, params: TwoFrequencyParams) -> dict[str, FloatArray]:
     """Mode and its probability of the satellites that fail; missing for the rest."""
-    failed = due & epoch.sound.failed & np.isfinite(epoch.sound.statistic)
+    failed = due & epoch.full_rank.failed & np.isfinite(epoch.full_rank.statistic)
     if not failed.any():
         return {}
     found = classify(epoch.mean_mps[[0, 1, 3]][:, failed], epoch.covariance[failed], params.band, params.other)

@@ -17,8 +17,8 @@ from gbas_core.ranging.combinations import iono_free_weights
 from gbas_core.record import FloatArray
 from gbas_ground.monitors.divergence_covariance import PRINTED_COVARIANCE
 
-Form = Literal["paper", "sound"]
-DEGREES_OF_FREEDOM: Final[dict[Form, int]] = {"paper": 4, "sound": 3}
+Form = Literal["published", "full_rank"]
+DEGREES_OF_FREEDOM: Final[dict[Form, int]] = {"published": 4, "full_rank": 3}
 _PRINTED_INVERSE: Final = np.linalg.pinv(PRINTED_COVARIANCE)
 
 
@@ -39,7 +39,7 @@ def with_iono_free_code(rates_mps: FloatArray, band: int, other: int) -> FloatAr
     return np.stack([code, other_code, near * code + far * other_code, carrier])
 
 
-def paper_form(means_mps: FloatArray, receivers: FloatArray) -> FloatArray:
+def published_form(means_mps: FloatArray, receivers: FloatArray) -> FloatArray:
     """The paper's test metric with its printed covariance over M: ``M x^T pinv(Q) x`` [-].
 
     Parameters
@@ -53,7 +53,7 @@ def paper_form(means_mps: FloatArray, receivers: FloatArray) -> FloatArray:
     return np.asarray(receivers * np.einsum("in,ij,jn->n", means_mps, _PRINTED_INVERSE, means_mps))
 
 
-def sound_form(rates_mps: FloatArray, covariance: FloatArray) -> FloatArray:
+def full_rank_form(rates_mps: FloatArray, covariance: FloatArray) -> FloatArray:
     """``x^T Q^-1 x`` of the three independent statistics [-].
 
     Parameters

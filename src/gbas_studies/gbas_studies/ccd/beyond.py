@@ -92,7 +92,7 @@ def white_noise_monitor(mode: str) -> Monitor:
     covariance = gain**2 * (COLUMNS * NOISE_M**2) @ COLUMNS.T
     means = COLUMNS @ fault_direction(mode)
     delta = float(means @ np.linalg.solve(covariance, means))
-    limit = float(np.sqrt(threshold("sound", P_FALSE_ALARM)))
+    limit = float(np.sqrt(threshold("full_rank", P_FALSE_ALARM)))
     return Monitor(name="gast-f-sound", gain=float(np.sqrt(delta)), threshold=limit, freedom=3)
 
 
@@ -131,12 +131,12 @@ def simulated(options: Options) -> list[Section]:
 
 
 def _quiet(nominal: MonitoredSeries, disturbed: MonitoredSeries, inflation: float) -> list[Item]:
-    limit = threshold("sound", P_FALSE_ALARM)
+    limit = threshold("full_rank", P_FALSE_ALARM)
     single = sum(int(alarm.sum()) for name, alarm in nominal.alarms.items() if name.startswith("gast-d"))
     double = int(nominal.alarms["gast-f-sound"].sum())
     tripped = disturbed.alarms["gast-d L1"] | disturbed.alarms["gast-d L5"]
     still = int(disturbed.alarms["gast-f-sound"].sum())
-    change = float(np.nanmax(np.abs(disturbed.sound - nominal.sound)))
+    change = float(np.nanmax(np.abs(disturbed.full_rank - nominal.full_rank)))
     return [
         Claim(
             name="Nominal: GAST D", holds=single == 0, new=True, paper_text="–", ours_text=f"{single or 'no'} alarms; "
@@ -145,7 +145,7 @@ def _quiet(nominal: MonitoredSeries, disturbed: MonitoredSeries, inflation: floa
         ),
         Claim(
             name="Nominal: GAST F, sound, calibrated", holds=double == 0, new=True, paper_text="–",
-            ours_text=f"{double or 'no'} alarms; largest metric {np.nanmax(nominal.sound):.1f} of {limit:.1f}",
+            ours_text=f"{double or 'no'} alarms; largest metric {np.nanmax(nominal.full_rank):.1f} of {limit:.1f}",
             definition=f"Covariance of another day, inflated by {inflation:.2f} for tails and sample.",
             why="" if double == 0 else "The calibrated covariance does not bound this day.",
         ),

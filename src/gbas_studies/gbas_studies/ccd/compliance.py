@@ -118,7 +118,9 @@ def critical_mapping(monitor: MonitorName) -> float:
     if monitor == "gast-d":
         single = monitor_for(monitor, "Code L1")
         return critical_mapping_gast_d(single.sigma_mps, single.threshold)[0]
-    squared, _ = critical_mapping_gast_f("paper" if monitor == "gast-f-paper" else "sound", P_FALSE_ALARM, power=2)
+    squared, _ = critical_mapping_gast_f(
+        "published" if monitor == "gast-f-paper" else "full_rank", P_FALSE_ALARM, power=2
+    )
     return float(np.sqrt(squared))
 
 

@@ -101,7 +101,7 @@ def _alarm_claims(chosen: RecordedSet, seen: MonitoredSeries) -> list[Item]:
             definition=f"0.0233 m/s, all bands, {_monitored(seen, single=True)}.", why=_alarm_reason(seen, alarms),
         )
     ]  # fmt: skip
-    limit = threshold("sound", P_FALSE_ALARM)
+    limit = threshold("full_rank", P_FALSE_ALARM)
     metrics, fewest = cross_validated(seen)
     count, largest = int((metrics > limit).sum()), float(np.nanmax(metrics))
     items.append(
@@ -117,7 +117,7 @@ def _alarm_claims(chosen: RecordedSet, seen: MonitoredSeries) -> list[Item]:
     items.append(
         Claim(
             name=f"{chosen.name}: GAST F, sound, printed Q", holds=printed == 0, new=True, paper_text="no false alarm",
-            ours_text=f"{printed or 'no'} alarms; largest metric {np.nanmax(seen.sound):.1f}",
+            ours_text=f"{printed or 'no'} alarms; largest metric {np.nanmax(seen.full_rank):.1f}",
             definition="Covariance (18) as if it were of this site.",
             why="" if printed == 0 else "Code multipath of ordinary antennas is larger than (18) bounds.",
         )
@@ -126,7 +126,7 @@ def _alarm_claims(chosen: RecordedSet, seen: MonitoredSeries) -> list[Item]:
 
 
 def _monitored(seen: MonitoredSeries, *, single: bool = False) -> str:
-    known = np.isfinite(seen.single_mean_mps[:, L1] if single else seen.sound)
+    known = np.isfinite(seen.single_mean_mps[:, L1] if single else seen.full_rank)
     return f"{int(known.any(axis=0).sum())} satellites, {int(known.sum())} statistics that count"
 
 
@@ -159,7 +159,7 @@ def _alarm_reason(seen: MonitoredSeries, alarms: Mapping[str, np.ndarray]) -> st
 
 def cross_validated(seen: MonitoredSeries) -> tuple[FloatArray, float]:
     """Test metric of each half of a series with the other half's calibration, and the fewest independent samples."""
-    there = np.flatnonzero(np.isfinite(seen.sound).any(axis=1))
+    there = np.flatnonzero(np.isfinite(seen.full_rank).any(axis=1))
     middle = int((there[0] + there[-1]) // 2)
     first, second = slice(0, middle), slice(middle, len(seen.time_s))
     parts, fewest = [], np.inf
@@ -294,8 +294,8 @@ def _storm(data: Path, options: Options) -> Section:
                 name=f"{chosen.name}: GAST F, sound", holds=not double.any(), new=True,
                 paper_text="ionosphere does not trip it", definition=f"Printed Q; {_monitored(seen)}.",
                 ours_text=f"{int(double.any(axis=0).sum()) or 'no'} satellites trip; largest metric "
-                f"{np.nanmax(seen.sound):.1f} of {threshold('sound', P_FALSE_ALARM):.1f}, largest DF rate {free:.4f} "
-                "m/s",
+                f"{np.nanmax(seen.full_rank):.1f} of {threshold('full_rank', P_FALSE_ALARM):.1f}, largest DF rate "
+                f"{free:.4f} m/s",
                 why="" if not double.any() else "Something besides the ionosphere diverges.",
             )
         )  # fmt: skip

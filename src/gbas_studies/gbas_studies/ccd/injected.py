@@ -30,7 +30,7 @@ from gbas_ground.monitors.ccd_f import (
 )
 from gbas_ground.monitors.divergence_classification import classify
 from gbas_ground.monitors.divergence_covariance import StatisticCovariance
-from gbas_ground.monitors.divergence_forms import paper_form, sound_form, threshold
+from gbas_ground.monitors.divergence_forms import full_rank_form, published_form, threshold
 from gbas_sim.atmosphere.fronts import WedgeFront
 from gbas_sim.atmosphere.ionosphere import IonosphereParams
 from gbas_sim.atmosphere.troposphere import Troposphere
@@ -169,7 +169,7 @@ def inject(base: Base, mode: str, d_mps: float, satellite: int) -> Detection:
         double, two = two_frequency_step(double, seen, T_S, base.params)
         said = {
             "gast-d L1": one.satellites.failed[L1, satellite], "gast-d L5": one.satellites.failed[L5, satellite],
-            "gast-f-paper": two.paper.failed[satellite], "gast-f-sound": two.sound.failed[satellite],
+            "gast-f-paper": two.published.failed[satellite], "gast-f-sound": two.full_rank.failed[satellite],
         }  # fmt: skip
         for name, alarm in said.items():
             if alarm and np.isnan(times[name]):
@@ -177,7 +177,7 @@ def inject(base: Base, mode: str, d_mps: float, satellite: int) -> Detection:
                 if name == "gast-f-sound":
                     found = classify(two.mean_mps[[0, 1, 3]], two.covariance, L1, L5)
                     ranked = found.plausible(satellite)
-        failed = two.sound.failed
+        failed = two.full_rank.failed
         others += int(failed.sum() - failed[satellite])
         if not np.isnan(list(times.values())).any():
             break
@@ -214,9 +214,11 @@ def expected_times_s(
     steady = {
         "gast-d L1": abs(direction[0] - direction[2]) / CcdParams().threshold_mps,
         "gast-d L5": abs(direction[1] - direction[3]) / CcdParams().threshold_mps,
-        "gast-f-paper": _root(paper_form(means[:, np.newaxis], count), threshold("paper", params.p_false_alarm)),
+        "gast-f-paper": _root(
+            published_form(means[:, np.newaxis], count), threshold("published", params.p_false_alarm)
+        ),
         "gast-f-sound": _root(
-            sound_form(means[[0, 1, 3], np.newaxis], covariance), threshold("sound", params.p_false_alarm)
+            full_rank_form(means[[0, 1, 3], np.newaxis], covariance), threshold("full_rank", params.p_false_alarm)
         ),
     }
     response = ramp_response(np.arange(4000), T_S / TAU_S)

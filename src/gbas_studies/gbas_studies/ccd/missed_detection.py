@@ -64,7 +64,7 @@ def critical_mapping_gast_f(form: Form, p_false_alarm: float, *, power: int = 1)
 
     Parameters
     ----------
-    form : {"paper", "sound"}
+    form : {"published", "full_rank"}
     p_false_alarm : float
     power : {1, 2}
         1: ``delta = m E`` [1/m], as the paper's 56.6 must be; 2: ``delta = m E^2`` [1/m^2], which the monitor obeys.

@@ -1,6 +1,7 @@
 """What the monitors make of a fault mode: direction of the statistic, size, threshold.
 
-Source: ENC 2015, 2.1 (GAST D), eq (15) to (18) (GAST F, the form "paper"); the form "sound" has three statistics.
+Source: ENC 2015, 2.1 (GAST D), eq (15) to (18) (GAST F, the form "published"); the form "full_rank" has three
+statistics.
 """
 
 from __future__ import annotations
@@ -70,12 +71,12 @@ def monitor_for(
     error_on : {"L1", "L5", "IF"}, optional
         What the error is of; the GAST D monitor watches that band (both for IF, and the more sensitive one counts).
     rounded : bool
-        Use the paper's rounded coefficients of eq (17) in the form "paper".
+        Use the paper's rounded coefficients of eq (17) in the form "published".
     threshold_mps : float
         Of the GAST D monitor, whose sigma and threshold are those of the mean over receivers [m/s].
     receivers : int
-        M, averaged by the GAST F monitors: the form "paper" divides all of its covariance, the form "sound" only what
-        is each receiver's own (:func:`gbas_ground.monitors.divergence_covariance.published_by_origin`).
+        M, averaged by the GAST F monitors: the form "published" divides all of its covariance, the form "full_rank"
+        only what is each receiver's own (:func:`gbas_ground.monitors.divergence_covariance.published_by_origin`).
 
     Raises
     ------
@@ -96,7 +97,7 @@ def monitor_for(
     if name == "gast-f-sound":
         means, covariance, freedom = means[list(INDEPENDENT)], _sound_covariance(receivers), 3
     delta = float(means @ np.linalg.pinv(covariance) @ means)
-    form: Literal["paper", "sound"] = "paper" if freedom == 4 else "sound"
+    form: Literal["published", "full_rank"] = "published" if freedom == 4 else "full_rank"
     limit = float(np.sqrt(threshold(form, P_FALSE_ALARM)))
     return Monitor(
         name="gast-f-paper" if freedom == 4 else "gast-f-sound",

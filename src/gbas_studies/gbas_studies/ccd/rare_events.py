@@ -137,7 +137,7 @@ def single_frequency(
 def two_frequency(
     mode: str | None, d_mps: float, sigma_m: FloatArray, sampling: Sampling, *, alarm: bool, p_false_alarm: float = 1e-9
 ) -> Estimate:
-    """The same for the sound GAST F form, with a known receiver clock.
+    """The same for the GAST F form of full rank, with a known receiver clock.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ def two_frequency(
     energy = float((pulse**2).sum())
     covariance = energy * (COLUMNS * sigma_m**2) @ COLUMNS.T
     root = np.linalg.cholesky(covariance)
-    limit = np.sqrt(threshold("sound", p_false_alarm))
+    limit = np.sqrt(threshold("full_rank", p_false_alarm))
     drift = np.zeros(4) if mode is None else d_mps * fault_direction(mode)
     mean = solve_triangular(root, COLUMNS @ drift, lower=True)
     size = float(np.linalg.norm(mean))

@@ -26,7 +26,7 @@ from gbas_ground.channels.tracking import stack
 from gbas_ground.monitors.ccd import CcdParams, ccd_step, initial_ccd
 from gbas_ground.monitors.ccd_f import TwoFrequencyInput, TwoFrequencyParams, initial_two_frequency, two_frequency_step
 from gbas_ground.monitors.divergence_covariance import Calibration, StatisticCovariance, calibrate
-from gbas_ground.monitors.divergence_forms import sound_form
+from gbas_ground.monitors.divergence_forms import full_rank_form
 from gbas_ground.params import GroundParams
 from gbas_msgs_py.joining import ReceptionQueue
 
@@ -146,7 +146,7 @@ class MonitoredSeries:
         Filtered DF, DF of the other band and IF carrier, where each counts [m/s].
     double_rate_mps : (E, R, 3, N) array
         The same before filtering.
-    paper, sound : (E, N) array
+    published, full_rank : (E, N) array
         Test metrics where satellites are monitored [-].
     single_mean_mps : (E, N_BANDS, N) array
         Means over receivers [m/s].
@@ -163,8 +163,8 @@ class MonitoredSeries:
     single_rate_mps: FloatArray
     double_mps: FloatArray
     double_rate_mps: FloatArray
-    paper: FloatArray
-    sound: FloatArray
+    published: FloatArray
+    full_rank: FloatArray
     single_mean_mps: FloatArray
     elevation_rad: FloatArray
     clock_satellites: FloatArray
@@ -173,16 +173,16 @@ class MonitoredSeries:
 
     def metric(self, covariance: StatisticCovariance) -> FloatArray:
         """The sound form's test metric with another covariance, (E, N) [-]."""
-        complete = np.asarray(np.isfinite(self.double_mps).all(axis=2) & np.isfinite(self.sound)[:, np.newaxis])
+        complete = np.asarray(np.isfinite(self.double_mps).all(axis=2) & np.isfinite(self.full_rank)[:, np.newaxis])
         receivers = complete.sum(axis=1)
         total = np.where(complete[:, :, np.newaxis], self.double_mps, 0.0).sum(axis=1)
         mean = np.where(receivers[:, np.newaxis] > 0, total / np.maximum(receivers, 1)[:, np.newaxis], np.nan)
         each = zip(mean, self.elevation_rad, receivers, self.clock_satellites, strict=True)
-        return np.array([sound_form(x, covariance.at(place, count, n)) for x, place, count, n in each])
+        return np.array([full_rank_form(x, covariance.at(place, count, n)) for x, place, count, n in each])
 
     def calibrated(self, tau_s: float, chosen: slice | BoolArray = ALL, *, bins: int = 5) -> Calibration:
         """Covariance from the epochs `chosen`, with so many bins of elevation holding about as many samples each."""
-        values = np.where(np.isfinite(self.sound)[:, np.newaxis, np.newaxis], self.double_mps, np.nan)[chosen]
+        values = np.where(np.isfinite(self.full_rank)[:, np.newaxis, np.newaxis], self.double_mps, np.nan)[chosen]
         elevation = self.elevation_rad[chosen]
         complete = np.asarray(np.isfinite(values).all(axis=2))
         there = elevation[complete.any(axis=1)]
@@ -323,7 +323,7 @@ class _Run:
             self._states[place] = (first, second)
             results.append((one, two))
         (one, two), (raw_one, raw_two) = results
-        self._failed = two.sound.failed
+        self._failed = two.full_rank.failed
         double = self._params[0][1]
         counts = one.settled & seen.used[:, np.newaxis]
         both = (counts[:, double.band] & counts[:, double.other])[:, np.newaxis]
@@ -332,14 +332,14 @@ class _Run:
             "single_rate_mps": np.where(counts, raw_one.receiver_mps, np.nan),
             "double_mps": np.where(both, two.receiver_mps.swapaxes(0, 1), np.nan),
             "double_rate_mps": np.where(both, raw_two.receiver_mps.swapaxes(0, 1), np.nan),
-            "paper": two.paper.statistic,
-            "sound": two.sound.statistic,
+            "published": two.published.statistic,
+            "full_rank": two.full_rank.statistic,
             "single_mean_mps": one.mean_mps,
             "elevation_rad": seen.elevation_rad,
             "clock_satellites": two.clock_satellites,
             **{f"gast-d {name}": one.satellites.failed[band] for band, name in enumerate(BANDS)},
-            "gast-f-paper": two.paper.failed,
-            "gast-f-sound": two.sound.failed,
+            "gast-f-paper": two.published.failed,
+            "gast-f-sound": two.full_rank.failed,
         }
 
 
