@@ -3,6 +3,7 @@
 ==============  =====================================================================================================
 ``satellites``  the satellite axis;  ``signals`` the band axis
 ``record``      records on them: frozen dataclasses whose fields say how they travel as a table
+``parameters``  declared once, for files, ROS, errors and documentation;  ``configuration`` files of them
 ``gnss``        time, frames, orbits, ephemerides, almanacs, one receiver's observations
 ``ranging``     cycle slips, carrier smoothing, combinations of bands, divergence filters
 ``models``      error models of the standard, multipliers of protection levels

@@ -6,8 +6,10 @@
 ``faults``            of satellites, signals and receivers
 ``receivers``         noise, clocks, C/N0, multipath, carriers that are lost and found; as good as the standards say
 ``flight``            straight in, or by the equations of motion
-``world``             one epoch of all that;  ``batches`` many of them as arrays
-``scenario``          reads the parameters;  ``keys`` names and units;  ``random_processes`` what is drawn, by epoch
+``world``             one epoch of all that;  ``world_params`` what it depends on;  ``simulated_epochs`` what it gives
+``instants``          where everything is at a time tag;  ``threat_checks`` refuses threats that would do nothing
+``batches``           many epochs as arrays
+``scenario``          reads the parameters;  ``random_processes`` what is drawn, by epoch
 ``rinex_files``       writes files
 ``nodes``             the programs
 ====================  ===============================================================================================

@@ -8,6 +8,7 @@ limit.
 - :mod:`~gbas_ground.ionosphere.threat`: the fronts there may be;
 - :mod:`~gbas_ground.ionosphere.range_error`: what one of them does to a corrected, smoothed range;
 - :mod:`~gbas_ground.ionosphere.places`: where aircraft may be;
+- :mod:`~gbas_ground.ionosphere.cases`: what is screened, of one sky;
 - :mod:`~gbas_ground.ionosphere.geometry_screening`: what that does to positions, and the least inflation that is safe;
 - :mod:`~gbas_ground.ionosphere.protection`: the station's state, renewed each minute;
 - :mod:`~gbas_ground.ionosphere.section`: parameters.
