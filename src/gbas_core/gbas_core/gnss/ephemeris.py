@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import IntEnum
+from functools import cached_property
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gbas_core.compiled import compiled
 from gbas_core.gnss.gpstime import SECONDS_PER_WEEK
 from gbas_core.record import FloatArray, Record, columns_of, per_satellite, scalar
 from gbas_core.satellites import IS_GPS, N_SATS, missing
@@ -60,6 +62,16 @@ class Ephemeris(Record):
     health: FloatArray = per_satellite("-", "signal health, 0 is healthy")
     accuracy_m: FloatArray = per_satellite("m", "URA or SISA")
 
+    @cached_property
+    def values(self) -> FloatArray:
+        """All fields of all satellites, ``(fields, N_SATS)``, in the order of :data:`FIELDS`. Not to be written to."""
+        return np.array([getattr(self, name) for name in FIELDS], dtype=np.float64)
+
+    def same_as(self, other: Ephemeris) -> NDArray[np.bool_]:
+        """Satellites of which both say the same, field by field, or nothing: ``(N_SATS,)``."""
+        ours, theirs = self.values, other.values
+        return np.asarray(((ours == theirs) | (np.isnan(ours) & np.isnan(theirs))).all(axis=0))
+
 
 VALIDITY_S: Final[FloatArray] = np.where(IS_GPS, 2 * 3600.0, 4 * 3600.0)
 """Largest |t - toe| an ephemeris is used at, on the satellite axis.
@@ -76,10 +88,10 @@ _ROW: Final[dict[str, int]] = {name: row for row, name in enumerate(FIELDS)}
 # Rows of the store after the ephemeris' own fields.
 _RECEIVED_WEEK: Final = len(FIELDS)
 _RECEIVED_TOW: Final = _RECEIVED_WEEK + 1
+_IOD, _TOE_WEEK, _TOE_TOW, _HEALTH = (_ROW[name] for name in ("iod", "toe_week", "toe_tow_s", "health"))
 _SIMULATED: Final = _RECEIVED_WEEK + 2
 _COMPLETE: Final = _RECEIVED_WEEK + 3
 _N_ROWS: Final = _RECEIVED_WEEK + 4
-_EVERY_SATELLITE: Final = np.arange(N_SATS)
 
 
 def is_complete(ephemeris: Ephemeris) -> NDArray[np.bool_]:
@@ -89,7 +101,7 @@ def is_complete(ephemeris: Ephemeris) -> NDArray[np.bool_]:
     nothing is computed from; Galileo is not, since a satellite without an accuracy prediction is marginal (Galileo OS
     Service Definition Document 1.3, 2.3.1.4).
     """
-    finite = np.isfinite(np.stack([getattr(ephemeris, name) for name in FIELDS]))
+    finite = np.isfinite(ephemeris.values)
     message = ephemeris.message
     finite[_ROW["accuracy_m"]] |= message == NavigationMessage.GPS_LNAV
     finite[_ROW["iodc"]] |= message != NavigationMessage.GPS_LNAV
@@ -108,8 +120,8 @@ class EphemerisStore:
         Newest first: the fields of :class:`Ephemeris` and when each was received. Not to be written to.
     """
 
-    values: FloatArray = field(default_factory=lambda: missing(STORE_DEPTH, _N_ROWS))
-    _picked: dict[bytes, FloatArray] = field(default_factory=dict, init=False, repr=False)
+    values: FloatArray = field(default_factory=lambda: _read_only(missing(STORE_DEPTH, _N_ROWS)))
+    _chosen: dict[bytes, Ephemeris] = field(default_factory=dict, init=False, repr=False)
     """The last choice: it is asked for at every epoch and changes with the hour."""
 
     def add(self, ephemeris: Ephemeris) -> EphemerisStore:
@@ -118,8 +130,7 @@ class EphemerisStore:
         To be added in order of reception and as time goes on: of each satellite only the last STORE_DEPTH are kept.
         """
         new = np.full((_N_ROWS, N_SATS), np.nan)
-        for row, name in enumerate(FIELDS):
-            new[row] = getattr(ephemeris, name)
+        new[: len(FIELDS)] = ephemeris.values
         new[_RECEIVED_WEEK] = ephemeris.gps_week
         new[_RECEIVED_TOW] = ephemeris.tow_s
         new[_SIMULATED] = ephemeris.simulated
@@ -131,9 +142,7 @@ class EphemerisStore:
         if not push.any():
             return self
         shifted = np.concatenate([new[np.newaxis], self.values[:-1]])
-        values = np.where(push, shifted, self.values)
-        values.flags.writeable = False
-        return EphemerisStore(values=values)
+        return EphemerisStore(values=_read_only(np.where(push, shifted, self.values)))
 
     def usable(self, gps_week: int, tow_s: float, settle_s: float) -> Ephemeris:
         """The ephemeris of each satellite to use at a time: the latest received that has settled.
@@ -148,48 +157,77 @@ class EphemerisStore:
         Returns
         -------
         Ephemeris
-            Its epoch is the given time. A satellite is missing (NaN) without an ephemeris that was received at least
-            `settle_s` ago, is complete and within :data:`VALIDITY_S`; and whenever the newest ephemeris received,
-            settled or not, does not say that the satellite is healthy.
+            The same object while the choice is the same; its epoch is when it was first made. A satellite is missing
+            (NaN) without an ephemeris that was received at least `settle_s` ago, is complete and within
+            :data:`VALIDITY_S`; and whenever the newest ephemeris received, settled or not, does not say that the
+            satellite is healthy.
         """
-        age = self._age_s(gps_week, tow_s)
-        return self._pick(gps_week, tow_s, age, age >= settle_s)
+        chosen = choose_settled(self.values, VALIDITY_S, int(gps_week), float(tow_s), float(settle_s))
+        return self._ephemeris(chosen, gps_week, tow_s)
 
     def matching(self, iod: FloatArray, gps_week: int, tow_s: float) -> Ephemeris:
         """The ephemeris of each satellite with the given issue of data ``(N_SATS,)``; missing as in :meth:`usable`.
 
         The issue of data is compared as the VDB carries it: eight bits, the lower ones of Galileo's IODnav.
         """
-        age = self._age_s(gps_week, tow_s)
-        same = np.mod(self.values[:, _ROW["iod"]], VDB_IOD_MODULUS) == np.mod(iod, VDB_IOD_MODULUS)
-        return self._pick(gps_week, tow_s, age, (age >= 0.0) & same)
+        chosen = choose_matching(self.values, VALIDITY_S, int(gps_week), float(tow_s), np.array(iod, dtype=np.float64))
+        return self._ephemeris(chosen, gps_week, tow_s)
 
-    def _age_s(self, gps_week: int, tow_s: float) -> FloatArray:
-        weeks = gps_week - self.values[:, _RECEIVED_WEEK]
-        return np.asarray(weeks * SECONDS_PER_WEEK + (tow_s - self.values[:, _RECEIVED_TOW]))
-
-    def _pick(self, gps_week: int, tow_s: float, age_s: FloatArray, candidate: NDArray[np.bool_]) -> Ephemeris:
-        values = self.values
-        since_toe = (gps_week - values[:, _ROW["toe_week"]]) * SECONDS_PER_WEEK + (tow_s - values[:, _ROW["toe_tow_s"]])
-        candidate = candidate & (np.abs(since_toe) <= VALIDITY_S) & (values[:, _COMPLETE] == 1.0)
-        chosen = np.where(candidate, age_s, np.inf).argmin(axis=0)
-        newest = np.where(age_s >= 0.0, age_s, np.inf).argmin(axis=0)
-        healthy = values[:, _ROW["health"]] == 0.0
-        found = candidate & healthy
-        found = found[chosen, _EVERY_SATELLITE] & healthy[newest, _EVERY_SATELLITE]
-        picked = self._rows(np.where(found, chosen, -1))
-        simulated = float((picked[_SIMULATED] > 0.0).any()) if found.any() else float("nan")
-        fields = dict(zip(FIELDS, picked, strict=False))
-        return Ephemeris(gps_week=gps_week, tow_s=tow_s, simulated=simulated, **fields)
-
-    def _rows(self, chosen: NDArray[np.int64]) -> FloatArray:
-        """Rows (rows, N_SATS) of the ephemerides at the given depths, NaN where the depth is -1; the same array again
-        while the choice is the same.
-        """
+    def _ephemeris(self, chosen: NDArray[np.int64], gps_week: int, tow_s: float) -> Ephemeris:
+        """The ephemerides at the given depths, missing where the depth is -1."""
         choice = chosen.tobytes()
-        if choice not in self._picked:
-            picked = np.where(chosen >= 0, self.values[chosen, :, _EVERY_SATELLITE].T, np.nan)
-            picked.flags.writeable = False
-            self._picked.clear()
-            self._picked[choice] = picked
-        return self._picked[choice]
+        if choice not in self._chosen:
+            picked = np.full((_N_ROWS, N_SATS), np.nan)
+            for satellite in np.flatnonzero(chosen >= 0):
+                picked[:, satellite] = self.values[chosen[satellite], :, satellite]
+            simulated = float((picked[_SIMULATED] > 0.0).any()) if (chosen >= 0).any() else float("nan")
+            fields = dict(zip(FIELDS, picked, strict=False))
+            self._chosen.clear()
+            self._chosen[choice] = Ephemeris(gps_week=gps_week, tow_s=tow_s, simulated=simulated, **fields)
+        return self._chosen[choice]
+
+
+def _read_only(values: FloatArray) -> FloatArray:
+    values.flags.writeable = False
+    return values
+
+
+@compiled
+def choose_settled(values, validity_s, gps_week, tow_s, settle_s):  # type: ignore[no-untyped-def]
+    """Depth of the ephemeris of each satellite that :meth:`EphemerisStore.usable` finds, -1 for none."""
+    chosen = np.empty(values.shape[2], np.int64)
+    for s in range(values.shape[2]):
+        chosen[s] = _youngest(values, s, validity_s[s], gps_week, tow_s, settle_s, np.nan)
+    return chosen
+
+
+@compiled
+def choose_matching(values, validity_s, gps_week, tow_s, iod):  # type: ignore[no-untyped-def]
+    """The same of :meth:`EphemerisStore.matching`."""
+    chosen = np.full(values.shape[2], -1)
+    for s in range(values.shape[2]):
+        if np.isfinite(iod[s]):
+            chosen[s] = _youngest(values, s, validity_s[s], gps_week, tow_s, 0.0, iod[s] % VDB_IOD_MODULUS)
+    return chosen
+
+
+@compiled
+def _youngest(values, s, validity_s, gps_week, tow_s, settle_s, iod):  # type: ignore[no-untyped-def]
+    """Depth of the youngest ephemeris of a satellite that is received, settled, complete, valid, healthy and not taken
+    back by a younger one; of a given issue of data, if that is not NaN. -1 for none.
+    """
+    best, newest, best_s, newest_s = -1, 0, np.inf, np.inf
+    for depth in range(values.shape[0]):
+        weeks = gps_week - values[depth, _RECEIVED_WEEK, s]
+        age_s = weeks * SECONDS_PER_WEEK + (tow_s - values[depth, _RECEIVED_TOW, s])
+        if age_s >= 0.0 and age_s < newest_s:
+            newest, newest_s = depth, age_s
+        weeks = gps_week - values[depth, _TOE_WEEK, s]
+        since_toe_s = weeks * SECONDS_PER_WEEK + (tow_s - values[depth, _TOE_TOW, s])
+        usable = age_s >= settle_s and abs(since_toe_s) <= validity_s and values[depth, _COMPLETE, s] == 1.0
+        usable = usable and (np.isnan(iod) or values[depth, _IOD, s] % VDB_IOD_MODULUS == iod)
+        if usable and age_s < best_s:
+            best, best_s = depth, age_s
+    if best < 0 or values[best, _HEALTH, s] != 0.0 or values[newest, _HEALTH, s] != 0.0:
+        return -1
+    return best

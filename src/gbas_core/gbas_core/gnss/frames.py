@@ -11,20 +11,28 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gbas_core.gnss.kernels.frames import WGS84_A_M, WGS84_B_M, WGS84_E2, WGS84_F, all_enu, all_geodetic
 from gbas_core.record import FloatArray
 
-# Source: WGS 84, NGA.STND.0036 table 3.1.
-WGS84_A_M: Final = 6_378_137.0
-WGS84_F: Final = 1.0 / 298.257223563
-WGS84_E2: Final = WGS84_F * (2.0 - WGS84_F)
-WGS84_B_M: Final = WGS84_A_M * (1.0 - WGS84_F)
+__all__ = [
+    "EARTH_RATE_RADPS",
+    "GM_GALILEO_M3PS2",
+    "GM_GPS_M3PS2",
+    "WGS84_A_M",
+    "WGS84_B_M",
+    "WGS84_E2",
+    "WGS84_F",
+    "azimuth_elevation",
+    "ecef_from_geodetic",
+    "geodetic_from_ecef",
+    "los_and_range",
+    "rot_enu_ecef",
+]
 
 # Source: IS-GPS-200N table 20-IV; Galileo OS SIS ICD 2.1, 5.1.1 (the same rate).
 EARTH_RATE_RADPS: Final = 7.292_115_146_7e-5
 GM_GPS_M3PS2: Final = 3.986_005e14
 GM_GALILEO_M3PS2: Final = 3.986_004_418e14
-
-_GEODETIC_ITERATIONS: Final = 3  # of Bowring's formula; the error is below 1e-9 m up to 50 000 km
 
 
 def ecef_from_geodetic(lat_rad: ArrayLike, lon_rad: ArrayLike, height_m: ArrayLike) -> FloatArray:
@@ -56,33 +64,15 @@ def geodetic_from_ecef(xyz_m: ArrayLike) -> tuple[FloatArray, FloatArray, FloatA
     Source: Bowring, Transformation from spatial to geographical coordinates, Survey Review 23 (1976), iterated a fixed
     number of times on the reduced latitude.
     """
-    xyz = np.asarray(xyz_m, dtype=np.float64)
-    horizontal = np.hypot(xyz[..., 0], xyz[..., 1])
-    z = xyz[..., 2]
-    sin_b, cos_b = _unit(z, (1.0 - WGS84_F) * horizontal)
-    for _ in range(_GEODETIC_ITERATIONS):
-        up = z + WGS84_E2 / (1.0 - WGS84_E2) * WGS84_B_M * sin_b**3
-        out = horizontal - WGS84_E2 * WGS84_A_M * cos_b**3
-        sin_b, cos_b = _unit((1.0 - WGS84_F) * up, out)
-    lat = np.arctan2(up, out)
-    sin_lat, cos_lat = np.sin(lat), np.cos(lat)
-    height = horizontal * cos_lat + z * sin_lat - WGS84_A_M * np.sqrt(1.0 - WGS84_E2 * sin_lat**2)
-    return lat, np.arctan2(xyz[..., 1], xyz[..., 0]), height
-
-
-def _unit(sine: FloatArray, cosine: FloatArray) -> tuple[FloatArray, FloatArray]:
-    norm = np.hypot(sine, cosine)
-    return sine / norm, cosine / norm
+    xyz = np.ascontiguousarray(xyz_m, dtype=np.float64)
+    lat, lon, height = all_geodetic(xyz.reshape(-1, 3)).reshape(3, *xyz.shape[:-1])
+    return lat, lon, height
 
 
 def rot_enu_ecef(lat_rad: ArrayLike, lon_rad: ArrayLike) -> FloatArray:
     """Rotation from ECEF to ENU axes at a geodetic latitude and longitude [rad], shape ``(..., 3, 3)``."""
     lat, lon = np.broadcast_arrays(np.asarray(lat_rad, dtype=np.float64), np.asarray(lon_rad, dtype=np.float64))
-    sin_lat, cos_lat, sin_lon, cos_lon = np.sin(lat), np.cos(lat), np.sin(lon), np.cos(lon)
-    rot = np.empty((*lat.shape, 3, 3))
-    rot[..., 0, 0], rot[..., 0, 1], rot[..., 0, 2] = -sin_lon, cos_lon, 0.0
-    rot[..., 1, 0], rot[..., 1, 1], rot[..., 1, 2] = -sin_lat * cos_lon, -sin_lat * sin_lon, cos_lat
-    rot[..., 2, 0], rot[..., 2, 1], rot[..., 2, 2] = cos_lat * cos_lon, cos_lat * sin_lon, sin_lat
+    rot: FloatArray = all_enu(np.array(lat).ravel(), np.array(lon).ravel()).reshape(*lat.shape, 3, 3)
     return rot
 
 

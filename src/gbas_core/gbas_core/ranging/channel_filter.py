@@ -10,13 +10,14 @@ Observations that mean nothing (infinite, or larger than any) have to be missing
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from gbas_core.gnss.observations import LARGEST_OBSERVATION
 from gbas_core.ranging.slips import ChannelObservations, SlipParams, SlipState, initial_slips, slip_step
-from gbas_core.ranging.smoothing import SmoothingParams, SmoothingState, initial_smoothing, smooth_step
-from gbas_core.record import BoolArray, FloatArray
+from gbas_core.ranging.smoothing import SmoothingParams, SmoothingState, initial_smoothing, smooth_bands
+from gbas_core.record import BoolArray, FloatArray, IntArray
 from gbas_core.signals import N_BANDS
 
 
@@ -40,6 +41,11 @@ class ChannelFilterParams:
     def __post_init__(self) -> None:
         if not self.bands or len(set(self.bands)) != len(self.bands) or not set(self.bands) <= set(range(N_BANDS)):
             raise ValueError(f"bands is {self.bands}: it must be distinct numbers of 0 to {N_BANDS - 1}, at least one")
+
+    @cached_property
+    def band_array(self) -> IntArray:
+        """The bands as an array."""
+        return np.array(self.bands, dtype=np.int64)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -126,14 +132,8 @@ def channel_filter_step(
     """
     dt_s = float("nan") if state.last_ms is None else (epoch_ms - state.last_ms) / 1000.0
     slips, found = slip_step(state.slips, observed, dt_s, params.slips)
-    bands = list(params.bands)
-    smoothing, smoothed_m = smooth_step(
-        state.smoothing,
-        observed.code_m[:, bands],
-        found.carrier_m[:, bands],
-        found.slipped[:, bands],
-        dt_s,
-        params.smoothing,
+    smoothing, smoothed_m = smooth_bands(
+        state.smoothing, observed.code_m, found.carrier_m, found.slipped, params.band_array, dt_s, params.smoothing
     )
     filtered = FilteredChannels(
         bands=params.bands,

@@ -28,39 +28,34 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntFlag
+from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gbas_core.ranging.kernels import slips as kernel
+from gbas_core.ranging.kernels.slips import SlipThresholds, find_slips
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import N_SATS
-from gbas_core.signals import L1, L2, L5, N_BANDS, SPEED_OF_LIGHT_MPS, WAVELENGTH_M
+from gbas_core.signals import N_BANDS
 
 CauseArray = NDArray[np.uint8]
 
 # Known: jerk of DO-229 normal manoeuvres, 0.25 g/s.
 NORMAL_MANOEUVRE_JERK_MPS3: Final = 0.25 * 9.80665
-# Uncertain, ours: a smaller common step is put down to the noise of the clock (0.5 microseconds).
-CLOCK_STEP_M: Final = 150.0
-
-_LAMBDA_M: Final = WAVELENGTH_M[:, np.newaxis]
-_MILLISECOND_M: Final = SPEED_OF_LIGHT_MPS * 1e-3
-# Codes smoothed by the receiver repeat by chance while the range stands still, but not beyond their noise.
-_FROZEN_CODE_M: Final = 1.0
-_WHOLE_MILLISECONDS_M: Final = 15.0  # a code step this close to whole milliseconds is one
 
 
 class SlipCause(IntFlag):
     """Why a measurement was flagged."""
 
-    LOCK = 1
-    GAP = 2
-    CODE = 4
-    DOPPLER = 8
-    RATE = 16
-    GEOMETRY_FREE = 32
-    FROZEN = 64
+    LOCK = kernel.LOCK
+    GAP = kernel.GAP
+    CODE = kernel.CODE
+    DOPPLER = kernel.DOPPLER
+    RATE = kernel.RATE
+    GEOMETRY_FREE = kernel.GEOMETRY_FREE
+    FROZEN = kernel.FROZEN
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -196,17 +191,6 @@ class ChannelObservations(NamedTuple):
         return self.range_m[:, np.newaxis, :]
 
 
-class _Epoch(NamedTuple):
-    """Changes since the last epoch."""
-
-    carrier_m: FloatArray  # (R, N_BANDS, N_SATS)
-    code_m: FloatArray
-    doppler_mps: FloatArray  # mean rate over the interval from the Dopplers
-    range_m: FloatArray  # (R, 1, N_SATS)
-    predicted_mps: FloatArray  # carrier rate extrapolated to this interval
-    dt_s: FloatArray  # (R, 1, 1) true interval between the samples
-
-
 def initial_slips(n_receivers: int = 1) -> SlipState:
     """State that has seen nothing."""
     nothing = np.full((n_receivers, N_BANDS, N_SATS), np.nan)
@@ -216,7 +200,7 @@ def initial_slips(n_receivers: int = 1) -> SlipState:
         doppler_hz=nothing,
         rate_mps=nothing,
         acceleration_mps2=nothing,
-        range_m=nothing[:, :1],
+        range_m=np.full((n_receivers, 1, N_SATS), np.nan),
         followed_m=np.zeros(n_receivers),
         dt_s=float("nan"),
     )
@@ -241,162 +225,40 @@ def slip_step(
     state : SlipState
     result : SlipResult
     """
-    observed = observed._replace(carrier_m=observed.carrier_m + state.followed_m[:, np.newaxis, np.newaxis])
-    cause, followed_m, clock_step_m = _lock_lost(observed.lli), state.followed_m, np.zeros(len(observed.code_m))
-    if 0.0 < dt_s <= params.max_gap_s:
-        epoch = _changes(state, observed, dt_s)
-        epoch, clock_step_m = _clock_step(epoch, params)
-        if params.follow_code_steps and clock_step_m.any():
-            step_m = _steps_to_follow(epoch, clock_step_m, params)
-            followed_m = followed_m + step_m
-            observed = observed._replace(carrier_m=observed.carrier_m + step_m[:, np.newaxis, np.newaxis])
-            epoch = epoch._replace(carrier_m=observed.carrier_m - state.carrier_m)
-        found, rate_mps = _tests(epoch, state, dt_s, params)
-        cause |= found | _frozen(state, observed.code_m, observed.carrier_m)
-        rate_mps = np.where(cause == 0, rate_mps, np.nan)
-    else:
-        cause |= _flag(np.isfinite(observed.carrier_m - state.carrier_m), SlipCause.GAP)
-        rate_mps = np.full_like(observed.carrier_m, np.nan)
+    code_m, carrier_m, doppler_hz, lli = map(np.ascontiguousarray, observed[:4])
+    range_m, dt_s = np.ascontiguousarray(observed.known_m), float(dt_s)
+    cause, slipped, carrier_m, rate_mps, acceleration_mps2, followed_m, clock_step_m = find_slips(
+        code_m, carrier_m, doppler_hz, lli, range_m,
+        state.code_m, state.carrier_m, state.doppler_hz, state.rate_mps, state.acceleration_mps2, state.range_m,
+        state.followed_m, state.dt_s, dt_s, thresholds(params, dt_s),
+    )  # fmt: skip
     new = SlipState(
-        code_m=observed.code_m,
-        carrier_m=observed.carrier_m,
-        doppler_hz=observed.doppler_hz,
+        code_m=code_m,
+        carrier_m=carrier_m,
+        doppler_hz=doppler_hz,
         rate_mps=rate_mps,
-        acceleration_mps2=(rate_mps - state.rate_mps) / (0.5 * (dt_s + state.dt_s)),
-        range_m=observed.known_m,
+        acceleration_mps2=acceleration_mps2,
+        range_m=range_m,
         followed_m=followed_m,
         dt_s=dt_s,
     )
-    result = SlipResult(slipped=cause != 0, cause=cause, clock_step_m=clock_step_m, carrier_m=observed.carrier_m)
-    return new, result
+    return new, SlipResult(slipped=slipped, cause=cause, clock_step_m=clock_step_m, carrier_m=carrier_m)
 
 
-def _lock_lost(lli: FloatArray) -> CauseArray:
-    """Bit 0 of the indicator as a cause."""
-    bits = np.where(np.isfinite(lli), lli, 0.0).astype(np.int64)
-    return _flag(bits & 1 == 1, SlipCause.LOCK)
-
-
-def _frozen(state: SlipState, code_m: FloatArray, carrier_m: FloatArray) -> CauseArray:
-    """Repeated measurements; a static receiver may meet one by chance for an instant, when a range turns round."""
-    moved = np.abs(carrier_m - state.carrier_m) > _FROZEN_CODE_M
-    return _flag((carrier_m == state.carrier_m) | ((code_m == state.code_m) & moved), SlipCause.FROZEN)
-
-
-def _flag(found: BoolArray, cause: SlipCause) -> CauseArray:
-    return found.astype(np.uint8) * np.uint8(cause)
-
-
-def _changes(state: SlipState, observed: ChannelObservations, dt_s: float) -> _Epoch:
-    return _Epoch(
-        carrier_m=observed.carrier_m - state.carrier_m,
-        code_m=observed.code_m - state.code_m,
-        doppler_mps=-0.5 * _LAMBDA_M * (observed.doppler_hz + state.doppler_hz),
-        range_m=observed.known_m - state.range_m,
-        predicted_mps=state.rate_mps + state.acceleration_mps2 * (0.5 * (dt_s + state.dt_s)),
-        dt_s=np.full((len(observed.code_m), 1, 1), dt_s),
+@lru_cache(maxsize=64)
+def thresholds(params: SlipParams, dt_s: float) -> SlipThresholds:
+    """Thresholds of all tests at an interval between epochs [s]."""
+    jerk_mps3 = params.satellite_jerk_mps3, 2.0 * params.receiver_jerk_mps3  # the receiver's counts twice
+    by_doppler_m, by_rate_m = ((jerk_mps3[0] * per, jerk_mps3[1] * per) for per in (dt_s**3 / 12.0, dt_s**3))
+    acceleration_m = params.geometry_free_acceleration_mps2 * dt_s**2
+    return SlipThresholds(
+        code_m=float(params.code_base_m + params.code_rate_mps * dt_s),
+        doppler_m=float(params.doppler_base_m + params.doppler_noise_mps * dt_s + by_doppler_m[0] + by_doppler_m[1]),
+        rate_m=float(params.rate_base_m + by_rate_m[0] + by_rate_m[1]),
+        range_m=float(params.rate_base_m + params.range_rate_mps * dt_s),
+        geometry_free_m=float(params.geometry_free_base_m + acceleration_m),
+        geometry_free_new_m=float(params.geometry_free_base_m + params.geometry_free_rate_mps * dt_s),
+        max_gap_s=float(params.max_gap_s),
+        min_satellites=int(params.min_satellites),
+        follow_code_steps=bool(params.follow_code_steps),
     )
-
-
-def _clock_step(epoch: _Epoch, params: SlipParams) -> tuple[_Epoch, FloatArray]:
-    """Common step of the codes (R,) [m], and the epoch with the true interval between the samples.
-
-    A clock that steps forward reads a given time earlier: the interval is shorter by the step.
-    """
-    rate_mps = np.where(np.isfinite(epoch.predicted_mps), epoch.predicted_mps, epoch.doppler_mps)
-    surprise_m = epoch.code_m - rate_mps * epoch.dt_s
-    if not (np.abs(surprise_m) > CLOCK_STEP_M).any():  # then their median is none either
-        return epoch, np.zeros(len(surprise_m))
-    common_m, _ = _common(surprise_m, params.min_satellites)
-    step_m = np.where(np.abs(common_m) > CLOCK_STEP_M, common_m, 0.0)
-    return epoch._replace(dt_s=epoch.dt_s - step_m / SPEED_OF_LIGHT_MPS), step_m[:, 0, 0]
-
-
-def _steps_to_follow(epoch: _Epoch, clock_step_m: FloatArray, params: SlipParams) -> FloatArray:
-    """Steps (R,) of whole milliseconds that the codes made and the carriers did not [m]."""
-    apart_m, enough = _common(epoch.code_m - epoch.carrier_m, params.min_satellites)
-    whole_m = np.round(apart_m / _MILLISECOND_M) * _MILLISECOND_M
-    whole = enough & (np.abs(apart_m - whole_m) < _WHOLE_MILLISECONDS_M)
-    result: FloatArray = np.where(whole[:, 0, 0] & (clock_step_m != 0.0), whole_m[:, 0, 0], 0.0)
-    return result
-
-
-def _tests(epoch: _Epoch, state: SlipState, dt_s: float, params: SlipParams) -> tuple[CauseArray, FloatArray]:
-    """Causes found by comparison with the past, and carrier rates [m/s] for the epochs to come."""
-    code = np.abs(epoch.carrier_m - epoch.code_m) > params.code_base_m + params.code_rate_mps * dt_s
-
-    beside_m = epoch.carrier_m - epoch.doppler_mps * epoch.dt_s
-    ahead_m = epoch.carrier_m - epoch.predicted_mps * epoch.dt_s
-    off_m = epoch.carrier_m - epoch.range_m
-    common_m, enough = _common(np.concatenate([beside_m, ahead_m, off_m]), params.min_satellites)
-    beside_common_m, ahead_common_m, off_common_m = np.split(common_m, 3)
-    _, enough_ahead, enough_off = np.split(enough, 3)
-
-    still_m = params.doppler_base_m + params.doppler_noise_mps * dt_s
-    doppler = _apart(beside_m - beside_common_m, still_m, dt_s**3 / 12.0, params)
-
-    rate = enough_ahead & _apart(ahead_m - ahead_common_m, params.rate_base_m, dt_s**3, params)
-
-    rate |= enough_off & (np.abs(off_m - off_common_m) > params.rate_base_m + params.range_rate_mps * dt_s)
-
-    tested = np.isfinite(beside_m) | (enough_ahead & np.isfinite(ahead_m)) | (enough_off & np.isfinite(off_m))
-    jumped = _geometry_free(epoch, state, tested & ~doppler & ~rate, dt_s, params)
-    cause = _flag(code, SlipCause.CODE) | _flag(doppler, SlipCause.DOPPLER)
-    cause |= _flag(rate, SlipCause.RATE) | _flag(jumped, SlipCause.GEOMETRY_FREE)
-    step_m = np.where(enough_ahead, ahead_common_m, beside_common_m)
-    step_m = np.where(np.abs(step_m) > CLOCK_STEP_M, step_m, 0.0)
-    return cause, (epoch.carrier_m - step_m) / epoch.dt_s
-
-
-def _apart(surprise_m: FloatArray, base_m: float, per_jerk_s3: float, params: SlipParams) -> BoolArray:
-    """Where a carrier left its prediction by more than noise and motion explain, (R, N_BANDS, N_SATS).
-
-    `per_jerk_s3` is how a jerk shows in the surprise.
-    """
-    still_m = base_m + params.satellite_jerk_mps3 * per_jerk_s3
-    return np.asarray(np.abs(surprise_m) > still_m + 2.0 * params.receiver_jerk_mps3 * per_jerk_s3)
-
-
-def _common(residual_m: FloatArray, min_satellites: int) -> tuple[FloatArray, BoolArray]:
-    """Median over satellites and bands (R, 1, 1), 0 if there are too few satellites, and whether there are enough."""
-    present = np.isfinite(residual_m)
-    enough = present.any(axis=1).sum(axis=-1) >= max(min_satellites, 1)
-    ordered = np.sort(residual_m.reshape(len(residual_m), -1), axis=-1)  # NaN last
-    number = present.reshape(ordered.shape).sum(axis=-1)
-    rows = np.arange(len(ordered))
-    low, high = np.maximum(number - 1, 0) // 2, np.minimum(number // 2, ordered.shape[-1] - 1)
-    median = np.where(enough, 0.5 * (ordered[rows, low] + ordered[rows, high]), 0.0)
-    return median[:, np.newaxis, np.newaxis], enough[:, np.newaxis, np.newaxis]
-
-
-def _geometry_free(
-    epoch: _Epoch, state: SlipState, consistent: BoolArray, dt_s: float, params: SlipParams
-) -> BoolArray:
-    """Bands taking part in a jump of a geometry-free difference, (R, N_BANDS, N_SATS).
-
-    A jump between L1 and L2 is put down to L2 alone where L1 agrees with L5 and passed a test of its own: codeless
-    tracking of L2 slips often, and L1 is what the corrections are made of.
-    """
-    jumped15, tested15 = _pair_jump(epoch, state, L5, dt_s, params)
-    jumped12, _ = _pair_jump(epoch, state, L2, dt_s, params)
-    cleared = tested15 & ~jumped15 & consistent[:, L1]
-    found = np.zeros(consistent.shape, dtype=bool)
-    found[:, L1] = jumped15 | (jumped12 & ~cleared)
-    found[:, L2] = jumped12
-    found[:, L5] = jumped15
-    return found
-
-
-def _pair_jump(
-    epoch: _Epoch, state: SlipState, other: int, dt_s: float, params: SlipParams
-) -> tuple[BoolArray, BoolArray]:
-    """Where the carrier of L1 minus that of another band jumped, and where it could be tested, both (R, N_SATS)."""
-    change_m = epoch.carrier_m[:, L1] - epoch.carrier_m[:, other]
-    surprise_m = change_m - (state.rate_mps[:, L1] - state.rate_mps[:, other]) * dt_s
-    followed = np.isfinite(surprise_m)
-    limit_m = np.where(
-        followed,
-        params.geometry_free_base_m + params.geometry_free_acceleration_mps2 * dt_s**2,
-        params.geometry_free_base_m + params.geometry_free_rate_mps * dt_s,
-    )
-    return np.abs(np.where(followed, surprise_m, change_m)) > limit_m, np.isfinite(change_m)

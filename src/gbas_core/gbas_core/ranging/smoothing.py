@@ -19,14 +19,18 @@ Source: ICAO Annex 10 Vol. I, App. B 3.6.8.3.5.1 (tau = 100 s); Jiang, Milner, M
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final, Literal, get_args
 
 import numpy as np
 
-from gbas_core.record import BoolArray, FloatArray
+from gbas_core.ranging.kernels.smoothing import ELAPSED, INVARIANT, VARIABLE, smooth
+from gbas_core.record import BoolArray, FloatArray, IntArray
 from gbas_core.satellites import N_SATS
 
 Start = Literal["variable", "elapsed", "invariant"]
+
+_FIRST: Final[IntArray] = np.zeros(1, dtype=np.int64)
 
 # Known: the two time constants of the message types 1 (GAST C) and 11 (GAST D).
 TAU_100_S: Final = 100.0
@@ -63,6 +67,16 @@ class SmoothingParams:
         if not (np.isfinite(self.max_gap_s) and self.max_gap_s > 0.0):
             raise ValueError(f"max_gap_s is {self.max_gap_s}: it must be above 0 s")
 
+    @cached_property
+    def tau_array_s(self) -> FloatArray:
+        """The time constants as an array [s]."""
+        return np.array(self.tau_s, dtype=np.float64)
+
+    @cached_property
+    def start_number(self) -> int:
+        """The start as the kernel has it."""
+        return {"variable": VARIABLE, "elapsed": ELAPSED, "invariant": INVARIANT}[self.start]
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SmoothingState:
@@ -97,29 +111,6 @@ def initial_smoothing(params: SmoothingParams, *leading: int, n_sats: int = N_SA
     )
 
 
-def hatch_step(
-    smoothed_m: FloatArray, code_m: FloatArray, delta_phase_m: FloatArray, weight: FloatArray | float
-) -> FloatArray:
-    """Advance a carrier-smoothed code range by one epoch.
-
-    Parameters
-    ----------
-    smoothed_m, code_m, delta_phase_m : (..., n_sats) arrays
-        Previous smoothed range, raw code range and carrier-range change since then [m].
-    weight : (..., n_sats) array
-        Filter weight T/tau, or 1/n while the filter fills [-].
-
-    Returns
-    -------
-    (..., n_sats) array
-        Smoothed range [m].
-
-    Source: Jiang, Milner, Macabiau, ENC 2015, eq (19).
-    """
-    result: FloatArray = weight * code_m + (1.0 - weight) * (smoothed_m + delta_phase_m)
-    return result
-
-
 def smooth_step(
     state: SmoothingState,
     code_m: FloatArray,
@@ -152,31 +143,46 @@ def smooth_step(
     smoothed_m : (n_tau, ..., N_SATS) array
         Smoothed range, one row per time constant [m]; the same array the state holds, so do not write into it.
     """
-    present = np.isfinite(code_m + carrier_m)
-    if 0.0 < dt_s <= params.max_gap_s:
-        kept = present & (state.count > 0.0) & ~slipped
-    else:
-        kept, dt_s = np.zeros_like(present), 0.0
-    count = np.where(kept, state.count + 1.0, present)
-    elapsed_s = np.where(kept, state.elapsed_s + dt_s, np.where(present, 0.0, np.nan))
-    weight = _weight(count, elapsed_s, dt_s, params)
-    smoothed_m = hatch_step(state.smoothed_m, code_m, carrier_m - state.carrier_m, weight)
-    smoothed_m = np.where(kept, smoothed_m, np.where(present, code_m, np.nan))
-    carrier_m = np.where(present, carrier_m, np.nan)
-    return SmoothingState(smoothed_m=smoothed_m, carrier_m=carrier_m, count=count, elapsed_s=elapsed_s), smoothed_m
+    shape, n_sats = code_m.shape, code_m.shape[-1]
+    rows = (-1, 1, n_sats)
+    before = SmoothingState(
+        smoothed_m=state.smoothed_m.reshape(len(params.tau_s), *rows),
+        carrier_m=state.carrier_m.reshape(rows),
+        count=state.count.reshape(rows),
+        elapsed_s=state.elapsed_s.reshape(rows),
+    )
+    code, carrier, slip = (np.ascontiguousarray(each).reshape(rows) for each in (code_m, carrier_m, slipped))
+    after, smoothed_m = smooth_bands(before, code, carrier, slip, _FIRST, dt_s, params)
+    new = SmoothingState(
+        smoothed_m=smoothed_m.reshape(len(params.tau_s), *shape),
+        carrier_m=after.carrier_m.reshape(shape),
+        count=after.count.reshape(shape),
+        elapsed_s=after.elapsed_s.reshape(shape),
+    )
+    return new, new.smoothed_m
 
 
-def _weight(count: FloatArray, elapsed_s: FloatArray, dt_s: float, params: SmoothingParams) -> FloatArray:
-    """Filter weight of every time constant, (n_tau, ..., N_SATS) or broadcastable to it, where a filter goes on."""
-    tau_s = np.array(params.tau_s)
-    # with a time constant of 0, or an interval above it, the filter is the raw code
-    share: FloatArray = np.divide(dt_s, tau_s, out=np.ones(tau_s.shape), where=tau_s > dt_s)
-    steady = share.reshape(-1, *(1,) * count.ndim)
-    if params.start == "invariant":
-        return steady
-    if params.start == "variable":
-        return np.maximum(1.0 / np.maximum(count, 1.0), steady)
-    return np.maximum(dt_s / np.where(elapsed_s > 0.0, elapsed_s, np.inf), steady)
+def smooth_bands(
+    state: SmoothingState,
+    code_m: FloatArray,
+    carrier_m: FloatArray,
+    slipped: BoolArray,
+    bands: IntArray,
+    dt_s: float,
+    params: SmoothingParams,
+) -> tuple[SmoothingState, FloatArray]:
+    """The same for some of the bands: observations ``(R, N_BANDS, N_SATS)``, the state ``(R, bands, N_SATS)``.
+
+    Parameters
+    ----------
+    bands : (bands,) int array
+        Their places on the band axis of the observations.
+    """
+    smoothed_m, last_m, count, elapsed_s = smooth(
+        code_m, carrier_m, slipped, bands, state.smoothed_m, state.carrier_m, state.count, state.elapsed_s,
+        float(dt_s), float(params.max_gap_s), params.tau_array_s, params.start_number,
+    )  # fmt: skip
+    return SmoothingState(smoothed_m=smoothed_m, carrier_m=last_m, count=count, elapsed_s=elapsed_s), smoothed_m
 
 
 def settled(state: SmoothingState, settle_s: float) -> BoolArray:

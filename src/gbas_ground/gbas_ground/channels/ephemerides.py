@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from gbas_core.gnss.ephemeris import FIELDS, Ephemeris, EphemerisStore
+from gbas_core.gnss.ephemeris import Ephemeris, EphemerisStore
 from gbas_core.record import BoolArray, FloatArray
-from gbas_core.satellites import SAT_IDS, missing
+from gbas_core.satellites import N_SATS, SAT_IDS, missing
 from gbas_ground.monitors.ephemeris_change import check_ephemeris_change
 from gbas_ground.params import GroundParams
 from gbas_msgs_py.codes import EventKind
@@ -21,18 +21,16 @@ SOURCE = "ephemerides"
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class EphemerisState:
-    """Ephemerides received, the ones in use, what tells these from others, and their CRCs ``(N,)``."""
+    """Ephemerides received, the ones in use, and their CRCs ``(N,)``."""
 
     store: EphemerisStore
     current: Ephemeris
-    identity: FloatArray
     crc: FloatArray
 
 
 def initial_ephemerides() -> EphemerisState:
     """Nothing received."""
-    none = Ephemeris(gps_week=0, tow_s=0.0)
-    return EphemerisState(store=EphemerisStore(), current=none, identity=_identity(none), crc=missing())
+    return EphemerisState(store=EphemerisStore(), current=Ephemeris(gps_week=0, tow_s=0.0), crc=missing())
 
 
 def _only(ephemeris: Ephemeris, satellites: BoolArray) -> Ephemeris:
@@ -71,21 +69,16 @@ def choose(
     events : tuple of Event
         The changes from one ephemeris to the next, with the new issue of data as value.
     """
-    current = state.store.usable(gps_week, tow_s, params.ephemeris.settle_s)
-    before, now = state.identity, _identity(current)
-    present, was_present = np.isfinite(current.message), np.isfinite(state.current.message)
+    current, before = state.store.usable(gps_week, tow_s, params.ephemeris.settle_s), state.current
+    if current is before:
+        return state, np.zeros(N_SATS, dtype=bool), ()
     # A record that differs anywhere is another one, under the same issue of data too: the CRC must tell the aircraft.
-    same = ((before == now) | (np.isnan(before) & np.isnan(now))).all(axis=0)
-    changed = present & ~same
+    present, was_present = np.isfinite(current.message), np.isfinite(before.message)
+    changed = present & ~current.same_as(before)
     crc = np.where(present, state.crc, np.nan)
     events = EventLog(gps_week, tow_s, SOURCE)
     if changed.any():
         crc = np.where(changed, ephemeris_crcs(_only(current, changed)), crc)
         for satellite in map(int, np.flatnonzero(changed & was_present)):
             events.add(EventKind.STATION, SAT_IDS[satellite], "new_ephemeris", float(current.iod[satellite]))
-    return EphemerisState(store=state.store, current=current, identity=now, crc=crc), changed, events.all()
-
-
-def _identity(ephemeris: Ephemeris) -> FloatArray:
-    """All fields of all satellites, ``(n_fields, N)``."""
-    return np.array([getattr(ephemeris, name) for name in FIELDS])
+    return EphemerisState(store=state.store, current=current, crc=crc), changed, events.all()

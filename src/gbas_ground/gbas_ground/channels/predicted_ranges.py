@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 
 from gbas_core.gnss.ephemeris import Ephemeris
 from gbas_core.gnss.frames import rot_enu_ecef
-from gbas_core.gnss.orbits import rotated_range, transmit_place
+from gbas_core.gnss.kernels.orbits import predicted_ranges
 from gbas_core.ranging.predicted_ranges import PredictedRanges
 from gbas_core.record import FloatArray
 from gbas_core.signals import L1
 from gbas_ground.params import GroundParams
-
-# Pseudorange assumed for the elevation of a satellite whose range is not known: it moves the satellite by less than
-# 70 m, that is the elevation by less than 0.0002 degrees.
-_MEAN_RANGE_M: Final = 23.0e6
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -59,8 +54,8 @@ def predict_ranges(
     band : int
         Band of the pseudoranges.
     """
-    own = np.concatenate([code_m, np.full((1, code_m.shape[-1]), np.nan)])
-    state = transmit_place(ephemeris, gps_week, tow_s, np.where(np.isfinite(own), own, _MEAN_RANGE_M), band)
-    range_m, los = rotated_range(site.positions_m, state.position_m)
-    east, north, up = (los[-1, 0] * axis[0] + los[-1, 1] * axis[1] + los[-1, 2] * axis[2] for axis in site.enu)
-    return PredictedRanges(range_m[:-1], state.clock_s[:-1], np.arcsin(up), np.arctan2(east, north))
+    band_code_m = np.ascontiguousarray(code_m)
+    range_m, clock_s, elevation_rad, azimuth_rad = predicted_ranges(
+        ephemeris.values, int(gps_week), float(tow_s), band_code_m, site.positions_m, site.enu, int(band)
+    )
+    return PredictedRanges(range_m, clock_s, elevation_rad, azimuth_rad)
