@@ -15,11 +15,10 @@ from gbas_ground.monitors.carrier_acceleration import (
     FEWEST_OTHERS,
     CarrierAccelerationParams,
     carrier_acceleration_step,
-    detectable_fault,
-    fault_response,
     fewest_others,
     initial_carrier_acceleration,
 )
+from gbas_ground.monitors.carrier_detectability import detectable_fault, fault_response
 from gbas_ground.monitors.double_difference import Troposphere, baselines_of, carrier_residual_m
 from loop_acceleration import loop_statistics
 from monitor_scenes import STATION, recorded_pair

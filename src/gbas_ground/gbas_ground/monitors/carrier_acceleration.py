@@ -23,7 +23,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Annotated, Final, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Final
 
 import numpy as np
 from scipy.special import bdtrc
@@ -33,11 +33,11 @@ from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import N_SATS
 from gbas_core.signals import L1, L5, N_BANDS
 from gbas_ground.monitors.carrier_noise import CarrierNoise
-from gbas_ground.monitors.expected_range import row_median
 from gbas_ground.monitors.false_alarm import EPOCH_S, EXPOSURE_S, FALSE_EXCLUSION, false_alarm_multiplier
 from gbas_ground.monitors.interface import MonitoredEpoch, MonitorOutput, SignalMonitor, Verdict
-from gbas_ground.monitors.monitor_table import moved, place_of_worst, row_of, signal_of, summarise, worst_of
-from gbas_ground.monitors.result import MonitorResult, upper_limit
+from gbas_ground.monitors.kernels import carrier_acceleration as kernels
+from gbas_ground.monitors.monitor_table import moved, place_of_worst, signal_of, summarise_each, worst_of
+from gbas_ground.monitors.result import MonitorResult
 from gbas_msgs_py.codes import ExclusionCause
 from gbas_msgs_py.monitors import CARRIER_ACCELERATION
 
@@ -45,7 +45,6 @@ if TYPE_CHECKING:
     from gbas_ground.prepared import PreparedStation
 
 STATISTICS: Final = ("step_m", "rate_mps", "acceleration_mps2")
-Fault = Literal["step", "ramp", "acceleration"]
 Triple = tuple[float, float, float]
 _LEAST_POINTS: Final = 4  # a parabola and one to spare
 _MOST_OTHERS: Final = 35
@@ -125,6 +124,11 @@ class CarrierAccelerationParams:
         """Standard deviations of every threshold: each channel and the average can exclude the source."""
         tests = len(STATISTICS) * len(self.bands) * (n_receivers + 1)
         return false_alarm_multiplier(self.p_false_alarm, tests=tests, interval_s=self.interval_s)
+
+    @cached_property
+    def common_and_natural(self) -> FloatArray:
+        """What the receivers share and what is no fault, ``(2, S)``."""
+        return np.array((self.common, self.natural), dtype=np.float64)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -211,254 +215,37 @@ def carrier_acceleration_step(
     state : CarrierAccelerationState
     result : CarrierAccelerationResult
     """
-    if shift_m is not None:
-        state = replace(state, residual_m=state.residual_m + shift_m[:, np.newaxis])
-    state = _with_epoch(state, residual_m, restarted, dt_s, params)
-    here = np.flatnonzero(np.isfinite(residual_m).any(axis=(0, 1)))
-    sigma = params.noise.factors(len(residual_m))[:, np.newaxis, np.newaxis] * params.noise.sigma_m(
-        elevation_rad[here], params.bands
+    noise, k = params.noise, params.multiplier(len(residual_m))
+    history, age, unseen = kernels.advanced(
+        state.residual_m,
+        state.age_s,
+        state.unseen_s,
+        np.ascontiguousarray(residual_m),
+        np.ascontiguousarray(restarted),
+        np.zeros(due.shape) if shift_m is None else shift_m,
+        float(dt_s),
+        float(params.window_s),
+        float(params.max_gap_s),
     )
-    k = params.multiplier(len(residual_m))
-    known = _judged(state.residual_m[..., here], state.age_s, sigma, k, params)
-    shape = (len(STATISTICS), *residual_m.shape)
-    values = np.full((3, *shape), np.nan)
-    values[..., here] = known
-    first = (np.arange(len(params.bands)) == 0)[:, np.newaxis]
-    wanted = due[:, np.newaxis] & (first | np.isfinite(values[0, 0]))
-    return state, _concluded(_Known(*values), wanted, k, params)
-
-
-def _with_epoch(
-    state: CarrierAccelerationState,
-    residual_m: FloatArray,
-    restarted: BoolArray,
-    dt_s: float,
-    params: CarrierAccelerationParams,
-) -> CarrierAccelerationState:
-    """The newest epoch in front; what does not belong to it is forgotten."""
-    goes_on = 0.0 < dt_s <= params.max_gap_s
-    age = np.concatenate([[0.0], state.age_s[:-1] + dt_s])
-    unseen = state.unseen_s + dt_s
-    history = np.concatenate([residual_m[np.newaxis], state.residual_m[:-1]])
-    in_window = age <= params.window_s if goes_on else np.arange(params.points) == 0
-    if not in_window.all():
-        history[~in_window] = np.nan
-    lost = (restarted | (unseen > params.max_gap_s)) & np.isfinite(unseen)
-    if lost.any():
-        history[1:, lost] = np.nan
-    return CarrierAccelerationState(
-        residual_m=history,
-        age_s=np.where(in_window, age, np.nan),
-        unseen_s=np.where(np.isfinite(residual_m), 0.0, unseen),
+    known = kernels.judged(
+        history,
+        age,
+        noise.sigma_m(elevation_rad, params.bands),
+        noise.factors(len(residual_m)),
+        params.common_and_natural,
+        k,
+        params.least_points,
+        params.min_satellites,
     )
-
-
-class _Known(NamedTuple):
-    """Statistics, variances and thresholds, ``(S, R, F, n)``."""
-
-    statistic: FloatArray
-    variance: FloatArray
-    threshold: FloatArray
-
-
-def _judged(
-    history_m: FloatArray, age_s: FloatArray, sigma_m: FloatArray, k: float, params: CarrierAccelerationParams
-) -> _Known:
-    """Statistics with the receivers' clocks taken from satellites that do not fail.
-
-    When one fails, all whose step, rate or acceleration is beyond the threshold from the receiver's median leave its
-    clock's set: a minority does not move the median, and a healthy satellite must not be the first to fail through the
-    mean. Then the worst satellite of each receiver and band leaves, and all is computed again, until nobody in a set
-    fails: a bad satellite must not be seen on the others through the clock.
-    """
-    change = history_m - history_m[0]
-    there = np.isfinite(change)
-    change = np.where(there, change, 0.0)
-    powers = np.where(np.isfinite(age_s), -age_s, 0.0) ** np.arange(5.0)[:, np.newaxis]
-    s = (powers @ there.reshape(len(there), sigma_m.size).astype(np.float64)).reshape(5, *sigma_m.shape)
-    epochs = there.any(axis=-1, keepdims=True).sum(axis=0)
-    in_set = (s[0] == epochs) & there[0] & (sigma_m > 0.0)
-    first = True
-    while True:
-        known = _statistics(change, there, powers[:3], s, sigma_m, in_set, k, params)
-        ratio = (np.abs(known.statistic) / known.threshold).max(axis=0)
-        beyond = in_set & (ratio > 1.0)
-        if not beyond.any():
-            return known
-        if first:
-            first = False
-            apart = in_set & _apart(change, powers[:3], s, in_set, known.threshold, params)
-            if apart.any():
-                in_set = in_set & ~apart
-                continue
-        in_set = in_set & ~(beyond & (ratio == np.where(beyond, ratio, 0.0).max(axis=-1, keepdims=True, initial=0.0)))
-
-
-def _apart(
-    change_m: FloatArray,
-    powers: FloatArray,
-    s: FloatArray,
-    in_set: BoolArray,
-    threshold: FloatArray,
-    params: CarrierAccelerationParams,
-) -> BoolArray:
-    """Channels whose statistics, clock and all, are beyond the threshold from the median of the set, ``(R, F, n)``."""
-    m = (powers @ change_m.reshape(len(change_m), in_set.size)).reshape(3, *in_set.shape)
-    statistic, _ = _solved(s, m, params.least_points)
-    known = in_set & np.isfinite(statistic).all(axis=0)
-    middle = row_median(np.where(known, statistic, np.nan))
-    return np.asarray(known & (np.abs(statistic - middle) > threshold).any(axis=0))
-
-
-def _statistics(
-    change_m: FloatArray,
-    there: BoolArray,
-    powers: FloatArray,
-    s: FloatArray,
-    sigma_m: FloatArray,
-    in_set: BoolArray,
-    k: float,
-    params: CarrierAccelerationParams,
-) -> _Known:
-    """Least squares of each channel over the epochs it has; times count back from the newest, at zero.
-
-    Notes
-    -----
-    With weights w_i in the clock, (phi_i - clock) / (1 - w_i) is phi_i less the mean of the others.
-    """
-    weight = np.where(in_set, sigma_m**-2, 0.0)
-    total = weight.sum(axis=-1, keepdims=True)
-    share = weight / np.where(total > 0.0, total, 1.0)
-    clock = (change_m * share).sum(axis=-1, keepdims=True)  # the set has every epoch its receiver has
-    free = (change_m - clock) * there / (1.0 - share)
-    m = (powers @ free.reshape(len(free), sigma_m.size)).reshape(3, *sigma_m.shape)
-    enough = in_set.sum(axis=-1, keepdims=True) - in_set >= params.min_satellites
-    variance = sigma_m**2 + 1.0 / np.where(enough, total - weight, np.nan)
-    statistic, gain = _solved(s, m, params.least_points)
-    # what has no variance has no statistic
-    spread = gain * variance
-    return _Known(np.where(np.isnan(spread), np.nan, statistic), spread, _thresholds(spread, k, params))
-
-
-def _solved(s: FloatArray, m: FloatArray, least_points: int) -> tuple[FloatArray, FloatArray]:
-    """Step, rate and acceleration, and their variances for a variance of one, from sums of t^k and of t^k y.
-
-    The newest epoch, at t = 0 with y = 0, is part of s_0 alone.
-    """
-    judged = s[0] >= least_points
-    slope = np.where(judged, s[0] * s[2] - s[1] ** 2, np.nan)
-    line = slope - s[2]  # the same without the newest
-    # Cramer's rule for the coefficient of t^2, half the acceleration; the minors are those of its column.
-    minor0 = s[1] * s[3] - s[2] ** 2
-    minor1 = s[0] * s[3] - s[1] * s[2]
-    parabola = minor0 * s[2] - minor1 * s[3] + slope * s[4]
-    statistic = np.stack(
-        [
-            (s[1] * m[1] - s[2] * m[0]) / line,
-            (s[0] * m[1] - s[1] * m[0]) / slope,
-            2.0 * (minor0 * m[0] - minor1 * m[1] + slope * m[2]) / parabola,
-        ]
+    channels, channels_failed, satellites, satellites_failed, failed_channels, failed_satellites = kernels.concluded(
+        known, due, params.common_and_natural, k
     )
-    return statistic, np.stack([1.0 + s[2] / line, s[0] / slope, 4.0 * slope / parabola])
-
-
-def _thresholds(variance: FloatArray, k: float, params: CarrierAccelerationParams) -> FloatArray:
-    column = (-1, *(1,) * (variance.ndim - 1))
-    common, natural = np.array(params.common).reshape(column), np.array(params.natural).reshape(column)
-    return np.asarray(k * np.sqrt(variance + common**2) + natural)
-
-
-def _concluded(
-    known: _Known, wanted: BoolArray, k: float, params: CarrierAccelerationParams
-) -> CarrierAccelerationResult:
-    statistic = known.statistic
-    size = np.abs(statistic)
-    channels = upper_limit(size, known.threshold, wanted[np.newaxis])
-    # channels that are not due judge no satellite that others are due for; alone, they show how it would do
-    there = np.isfinite(statistic[0]) & (wanted | ~wanted.any(axis=0))
-    beyond = np.logical_or.reduce(size > known.threshold, axis=0) & there  # (R, F, N)
-    number = beyond.sum(axis=0)
-    alone = (number == 1) & (there.sum(axis=0) >= 3)
-    taken = there & ~(beyond & alone)
-    count = np.maximum(taken.sum(axis=0), 1)
-    mean = np.where(taken.any(axis=0), np.where(taken, statistic, 0.0).sum(axis=1) / count, np.nan)
-    spread = np.where(taken, known.variance, 0.0).sum(axis=1) / count**2
-    due = np.broadcast_to(wanted.any(axis=0), mean.shape)
-    averaged = upper_limit(np.abs(mean), _thresholds(spread, k, params), due)
-    blamed = (number >= 1) & ~alone & due[0]
-    satellites = MonitorResult(
-        statistic=averaged.statistic, threshold=averaged.threshold, failed=averaged.failed | blamed
+    return CarrierAccelerationState(residual_m=history, age_s=age, unseen_s=unseen), CarrierAccelerationResult(
+        channels=MonitorResult(statistic=channels[0], threshold=channels[1], failed=channels_failed),
+        satellites=MonitorResult(statistic=satellites[0], threshold=satellites[1], failed=satellites_failed),
+        failed_channels=failed_channels,
+        failed_satellites=failed_satellites,
     )
-    missing = wanted & ~there
-    return CarrierAccelerationResult(
-        channels=channels,
-        satellites=satellites,
-        failed_channels=((beyond & alone & wanted) | missing).any(axis=1),
-        failed_satellites=np.asarray(satellites.failed.any(axis=(0, 1))),
-    )
-
-
-def fault_response(
-    fault: Fault, since_s: float, params: CarrierAccelerationParams, interval_s: float = EPOCH_S
-) -> FloatArray:
-    """What a unit fault makes of the three statistics some time after its onset.
-
-    Parameters
-    ----------
-    fault : {"step", "ramp", "acceleration"}
-        1 m, 1 m/s or 1 m/s^2 from the onset on.
-    since_s : float
-        Age of the fault at the newest epoch [s].
-    params : CarrierAccelerationParams
-        The window is full.
-    interval_s : float
-        Between epochs [s].
-
-    Returns
-    -------
-    (3,) array
-        In the order of :data:`STATISTICS`.
-    """
-    age = np.arange(min(params.points, int(params.window_s / interval_s) + 1)) * interval_s
-    grown = np.maximum(since_s - age, 0.0)
-    signal = {"step": (since_s >= age).astype(np.float64), "ramp": grown, "acceleration": 0.5 * grown**2}[fault]
-    change = signal - signal[0]
-    powers = (-age) ** np.arange(5)[:, np.newaxis]
-    return _solved(powers.sum(axis=1), powers[:3] @ change, params.least_points)[0]
-
-
-def detectable_fault(
-    fault: Fault,
-    since_s: float,
-    sigma_m: float,
-    params: CarrierAccelerationParams,
-    *,
-    n_receivers: int = 1,
-    k_md: float = 0.0,
-    interval_s: float = EPOCH_S,
-) -> float:
-    """Smallest fault of a satellite that is found by its age `since_s` at the latest, in the fault's unit.
-
-    Parameters
-    ----------
-    fault, since_s, params, interval_s
-        As of :func:`fault_response`.
-    sigma_m : float
-        Sigma of one receiver's carrier less its clock [m].
-    n_receivers : int
-        Receivers averaged.
-    k_md : float
-        Standard deviations for missed detection; 0 is one half.
-    """
-    ages = np.arange(round(since_s / interval_s) + 1) * interval_s
-    age = np.arange(min(params.points, int(params.window_s / interval_s) + 1)) * interval_s
-    sums = ((-age) ** np.arange(5)[:, np.newaxis]).sum(axis=1)
-    variance = _solved(sums, np.zeros(3), params.least_points)[1] * sigma_m**2 / n_receivers
-    needed = _thresholds(variance, params.multiplier(n_receivers), params)
-    needed = needed + k_md * np.sqrt(variance + np.array(params.common) ** 2)
-    with np.errstate(divide="ignore"):
-        sizes = [needed / np.abs(fault_response(fault, each, params, interval_s)) for each in ages]
-    return float(np.min(sizes))
 
 
 # --- in the station
@@ -466,6 +253,7 @@ def detectable_fault(
 
 _TESTS: Final = tuple(CARRIER_ACCELERATION.test(name) for name in ("step", "rate", "acceleration"))
 """In the order of the statistics."""
+_KEYS: Final = tuple(CARRIER_ACCELERATION.key(test.name) for test in _TESTS)
 
 
 def _initial(station: PreparedStation) -> CarrierAccelerationState:
@@ -474,11 +262,10 @@ def _initial(station: PreparedStation) -> CarrierAccelerationState:
 
 def _step(state: CarrierAccelerationState, epoch: MonitoredEpoch) -> tuple[CarrierAccelerationState, MonitorOutput]:
     inputs, params = epoch.inputs, epoch.inputs.station.carrier_acceleration
-    bands = list(params.bands)
     state, found = carrier_acceleration_step(
         state,
-        inputs.residual_m[:, bands],
-        inputs.slipped[:, bands],
+        inputs.residual_m.take(params.bands, axis=1),
+        inputs.slipped.take(params.bands, axis=1),
         inputs.ready & inputs.due,
         inputs.predicted.elevation_rad,
         inputs.dt_s,
@@ -488,10 +275,7 @@ def _step(state: CarrierAccelerationState, epoch: MonitoredEpoch) -> tuple[Carri
     known = np.isfinite(found.satellites.statistic[0, 0])
     signal = signal_of(params.bands)
     return state, MonitorOutput(
-        summaries={
-            CARRIER_ACCELERATION.key(test.name): summarise(row_of(found.satellites, number), inputs.due, signal)
-            for number, test in enumerate(_TESTS)
-        },
+        summaries=dict(zip(_KEYS, summarise_each(found.satellites, inputs.due, signal), strict=True)),
         satellites=_satellite_verdicts(found, inputs.due & known) if params.exclude else (),
         channels=_channel_verdicts(found) if params.exclude else (),
         ready=known if params.exclude else None,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from typing import Annotated
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from gbas_core.parameters import Parameter, ParameterError, parameters
 from gbas_core.record import FloatArray
+from gbas_ground.monitors.kernels.carrier_noise import carrier_sigmas_m
 
 Bands = tuple[float, float, float]
 
@@ -41,9 +43,14 @@ class CarrierNoise:
 
     def sigma_m(self, elevation_rad: ArrayLike, bands: tuple[int, ...]) -> FloatArray:
         """Sigma of a receiver of factor 1, ``(F, N)`` for elevations ``(N,)`` [m]."""
-        decay = np.exp(np.asarray(elevation_rad, dtype=np.float64) * (-1.0 / self.scale_rad))
-        floor, low = np.array([[values[band] for band in bands] for values in (self.floor_m, self.low_m)])
-        return np.asarray(floor[:, np.newaxis] + low[:, np.newaxis] * decay)
+        elevation = np.array(elevation_rad, dtype=np.float64, ndmin=1)
+        floor, low = self._coefficients_m.take(bands, axis=1)
+        return carrier_sigmas_m(elevation, floor, low, float(self.scale_rad))
+
+    @cached_property
+    def _coefficients_m(self) -> FloatArray:
+        """a_0 and a_1 of all bands, ``(2, N_BANDS)`` [m]."""
+        return np.array((self.floor_m, self.low_m), dtype=np.float64)
 
     def factors(self, n_receivers: int) -> FloatArray:
         """Factor of each receiver, ``(R,)``.
@@ -55,4 +62,6 @@ class CarrierNoise:
         """
         if len(self.receiver_factor) not in (1, n_receivers):
             raise ValueError(f"carrier noise: {len(self.receiver_factor)} receiver factors for {n_receivers} receivers")
-        return np.broadcast_to(np.array(self.receiver_factor, dtype=np.float64), (n_receivers,))
+        if len(self.receiver_factor) == 1:
+            return np.full(n_receivers, self.receiver_factor[0], dtype=np.float64)
+        return np.array(self.receiver_factor, dtype=np.float64)

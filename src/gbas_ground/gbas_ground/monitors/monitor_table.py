@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import N_SATS, RANGING_SOURCE_ID
 from gbas_core.signals import L1, L2, L5
+from gbas_ground.monitors.kernels.worst import worst_along
 from gbas_ground.monitors.result import MonitorResult
 from gbas_msgs_py.codes import MonitorState, Signal
 from gbas_msgs_py.monitors import TESTS, TestKey
@@ -84,11 +85,33 @@ def summarise(result: MonitorResult, due: BoolArray, signal: Signal = Signal.L1)
     MonitorSummary
         Statistic and threshold are those of the comparison that is furthest over its threshold, or nearest to it.
     """
-    axes = result.statistic.ndim - 1
-    worst = worst_of(result, axes=axes) if axes else result
     expected = due if due.ndim == 1 else np.logical_or.reduce(due.reshape(-1, N_SATS))
-    threshold = np.broadcast_to(worst.threshold, worst.statistic.shape)
-    return MonitorSummary(worst.statistic, threshold, worst.failed, expected, signal)
+    statistic, threshold, failed = result.statistic, result.threshold, result.failed
+    if statistic.ndim > 1:
+        statistic, threshold, failed = (each[0] for each in _worst_of_each(result, 1))
+    elif threshold.ndim == 0:
+        threshold = np.full(statistic.shape, threshold)
+    return MonitorSummary(statistic, threshold, failed, expected, signal)
+
+
+def summarise_each(
+    result: MonitorResult, due: BoolArray, signal: Signal = Signal.L1
+) -> tuple[MonitorSummary, ...]:
+    """The same of several tests, which are the first axis of the result; `due` is ``(N,)``."""
+    worst = _worst_of_each(result, len(result.statistic))
+    return tuple(MonitorSummary(*each, due, signal) for each in zip(*worst, strict=True))
+
+
+def _worst_of_each(result: MonitorResult, count: int) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Statistic, threshold and verdict of the worst of each of so many tests, ``(count, N)``."""
+    shape = (count, -1, N_SATS)
+    given = result.threshold
+    threshold = given if given.shape == result.statistic.shape else np.broadcast_to(given, result.statistic.shape).copy()
+    statistic, failed = np.ascontiguousarray(result.statistic), np.ascontiguousarray(result.failed)
+    found: tuple[FloatArray, FloatArray, BoolArray] = worst_along(
+        statistic.reshape(shape), np.ascontiguousarray(threshold).reshape(shape), failed.reshape(shape)
+    )
+    return found
 
 
 def monitor_epoch(gps_week: int, tow_s: float, summaries: Summaries, shown: BoolArray) -> MonitorEpoch:
