@@ -13,6 +13,8 @@ from the record's own declaration (:func:`gbas_core.record.columns_of`); nothing
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from operator import attrgetter
 from typing import Any, Final, Generic, TypeVar
 
 import numpy as np
@@ -20,6 +22,15 @@ from numpy.typing import NDArray
 
 from gbas_core.record import ColumnSpec, FloatArray, Record, columns_of
 from gbas_core.satellites import N_SATS, RANGING_SOURCE_ID
+from gbas_msgs_py.kernels.rows import (
+    Codes,
+    check_codes,
+    first_infinite,
+    row_columns,
+    row_table,
+    satellite_columns,
+    satellite_table,
+)
 
 R = TypeVar("R", bound=Record)
 
@@ -51,42 +62,32 @@ class RowLayout:
     def __init__(self, identifier: str, specs: tuple[ColumnSpec, ...]) -> None:
         self._identifier = identifier
         self.names = tuple(spec.names[0] for spec in specs)
-        coded = [(place, spec.codes) for place, spec in enumerate(specs) if spec.codes is not None]
-        self._coded = np.array([place for place, _ in coded], dtype=np.int64)
-        self._sizes = np.array([max(codes) + 1 for _, codes in coded], dtype=np.int64)
-        self._known = np.zeros((len(coded), int(self._sizes.max(initial=0)) + 1), dtype=bool)
-        for row, (_, codes) in enumerate(coded):
-            self._known[row, list(codes)] = True
-        key = np.array([specs[place].key for place, _ in coded], dtype=bool)
+        coded = [(place, spec.codes, spec.key) for place, spec in enumerate(specs) if spec.codes is not None]
+        sizes = [max(codes) + 1 for _, codes, _ in coded]
+        known = np.zeros((len(coded), max(sizes, default=0)), dtype=bool)
+        for row, (_, codes, _) in enumerate(coded):
+            known[row, list(codes)] = True
         # A key is one number: its codes as digits, each of its own base.
-        bases = np.where(key, self._sizes, 1)
-        self._weights = np.where(key, np.cumprod(bases) // np.maximum(bases, 1), 0)
-
-    def block(self, record: Record) -> FloatArray:
-        """The rows of a record, ``(rows, columns)``."""
-        columns = [getattr(record, name) for name in self.names]
-        if any(column.ndim != 1 or column.shape != columns[0].shape for column in columns):
-            shapes = ", ".join(f"{name} {column.shape}" for name, column in zip(self.names, columns, strict=True))
-            raise SchemaError(f"{self._identifier}: columns of rows have shapes {shapes}, expected one length")
-        return np.column_stack(columns)
+        weights, n_keys = np.zeros(len(coded), dtype=np.int64), 1
+        for row, (_, _, key) in enumerate(coded):
+            if key:
+                weights[row], n_keys = n_keys, n_keys * sizes[row]
+        places = np.array([place for place, _, _ in coded], dtype=np.int64)
+        self._codes = Codes(places, known, weights, n_keys, len(specs))
 
     def check(self, block: FloatArray) -> None:
-        """Refuse unknown codes and rows about the same."""
-        values = block[:, self._coded]
-        inside = (values >= 0.0) & (values < self._sizes)
-        numbers = np.where(inside, values, 0.0).astype(np.int64)
-        good = inside & (numbers == values) & self._known[np.arange(len(self._coded)), numbers]
-        if not good.all():
-            row, place = np.argwhere(~good)[0]
-            name = self.names[self._coded[place]]
-            raise SchemaError(f"{self._identifier}: {name} {values[row, place]:g} is not a known code")
-        keys = np.sort(numbers @ self._weights) if self._weights.any() else np.arange(len(numbers))
-        same = keys[1:] == keys[:-1]
-        if same.any():
-            row = int(np.flatnonzero(numbers @ self._weights == keys[1:][same][0])[0])
-            digits = [place for place, weight in enumerate(self._weights) if weight]
-            what = ", ".join(f"{self.names[self._coded[place]]} {numbers[row, place]}" for place in digits)
-            raise SchemaError(f"{self._identifier}: more than one row with {what}")
+        """Refuse unknown codes and rows about the same; `block` has the columns after one another."""
+        row, coded, twice = check_codes(block, self._codes)
+        if row < 0 and twice < 0:
+            return
+        columns = block.reshape(len(self.names), -1)
+        if row >= 0:
+            place = self._codes.place[coded]
+            value = columns[place, row]
+            raise SchemaError(f"{self._identifier}: {self.names[place]} {value:g} is not a known code")
+        key = [place for place, weight in zip(self._codes.place, self._codes.weights, strict=True) if weight]
+        what = ", ".join(f"{self.names[place]} {columns[place, twice]:g}" for place in key)
+        raise SchemaError(f"{self._identifier}: more than one row with {what}")
 
 
 class TableSchema(Generic[R]):
@@ -122,9 +123,11 @@ class TableSchema(Generic[R]):
         self._rows = RowLayout(self.identifier, tuple(spec for _, spec in specs if spec.row))
         self.has_rows = bool(self._rows.names)
         self._arrays, satellite_columns = _array_layout(specs)
+        self._shapes = [shape for _, _, shape in self._arrays]
         self.has_satellites = bool(self._arrays)
+        self._values = _getter(self._scalars)
+        self._columns = _getter(self._rows.names or tuple(name for name, _, _ in self._arrays))
         self._n_head = len(_EPOCH_COLUMNS) + len(self._scalars)
-        self._n_block = len(satellite_columns)
         if self.has_rows and self.has_satellites:
             raise SchemaError(f"{self.identifier}: has fields on the satellite axis and fields of rows")
         sat = (_SAT_COLUMN, *satellite_columns) if self.has_satellites else ()
@@ -167,48 +170,43 @@ class TableSchema(Generic[R]):
         if type(record) is not self.record_type:
             raise SchemaError(f"{self.identifier}: encodes {self.record_type.__name__}, not {type(record).__name__}")
         _check_epoch(self.identifier, float(record.gps_week), float(record.tow_s))
-        head = [record.gps_week, record.tow_s, *[getattr(record, name) for name in self._scalars]]
+        head = np.array([record.gps_week, record.tow_s, *self._values(record)], dtype=np.float64)
         if self.has_satellites:
-            table = self._satellite_rows(record, head)
+            table, infinite = satellite_table(self._block(record), head, _SOURCE_ID_F)
         elif self.has_rows:
-            table = self._own_rows(record, head)
+            table, infinite = self._own_rows(record, head)
         else:
-            table = np.array([head], dtype=np.float64)
-        _check_finite_or_nan(self.identifier, self.columns, table)
+            table = head[np.newaxis]
+            infinite = first_infinite(table)
+        self._refuse_infinite(infinite)
         self._check_record(record)
         return table
 
-    def _own_rows(self, record: R, head: list[float]) -> FloatArray:
-        block = self._rows.block(record)
-        table = np.empty((max(len(block), 1), len(self.columns)))
-        table[:, : self._n_head] = head
-        table[:, self._n_head :] = block if len(block) else np.nan
-        _check_finite_or_nan(self.identifier, self.columns, table)
+    def _block(self, record: R) -> FloatArray:
+        """The satellite columns after one another."""
+        values = self._columns(record)
+        if [each.shape for each in values] != self._shapes:
+            for each, (name, _, shape) in zip(values, self._arrays, strict=True):
+                if each.shape != shape:
+                    raise SchemaError(f"{self.identifier}: {name} has shape {each.shape}, expected {shape}")
+        return np.concatenate(values, axis=None, dtype=np.float64)
+
+    def _own_rows(self, record: R, head: FloatArray) -> tuple[FloatArray, int]:
+        values = self._columns(record)
+        if any(each.ndim != 1 or each.shape != values[0].shape for each in values):
+            shapes = ", ".join(f"{name} {each.shape}" for name, each in zip(self._rows.names, values, strict=True))
+            raise SchemaError(f"{self.identifier}: columns of rows have shapes {shapes}, expected one length")
+        block = np.concatenate(values, axis=None, dtype=np.float64)
+        table, infinite = row_table(block, head, len(values))
+        self._refuse_infinite(infinite)
         self._rows.check(block)
-        return table
+        return table, infinite
 
     def _check_record(self, record: R) -> None:
         try:
             record.check()
         except ValueError as error:
             raise SchemaError(f"{self.identifier}: {error}") from None
-
-    def _satellite_rows(self, record: R, head: list[float]) -> FloatArray:
-        block = np.empty((self._n_block, N_SATS))
-        for name, rows, shape in self._arrays:
-            values = getattr(record, name)
-            if values.shape != shape:
-                raise SchemaError(f"{self.identifier}: {name} has shape {values.shape}, expected {shape}")
-            block[rows] = values.reshape(-1, N_SATS)
-        present = np.flatnonzero(~np.isnan(block).all(axis=0))
-        table = np.empty((max(present.size, 1), len(self.columns)))
-        table[:, : self._n_head] = head
-        if present.size:
-            table[:, self._n_head] = _SOURCE_ID_F[present]
-            table[:, self._n_head + 1 :] = block[:, present].T
-        else:
-            table[:, self._n_head :] = np.nan
-        return table
 
     def decode(self, label: str, data: NDArray[np.float64]) -> R:
         """Record of a table.
@@ -231,62 +229,56 @@ class TableSchema(Generic[R]):
             raise SchemaError(
                 f"{self.identifier}: table of shape {data.shape}, expected (1 or more, {len(self.columns)})"
             )
-        head = self._checked_head(data)
-        _check_finite_or_nan(self.identifier, self.columns, data)
-        values: dict[str, Any] = dict(zip(self._scalars, head[2:], strict=True))
+        if data.shape[0] > 1 and not (self.has_satellites or self.has_rows):
+            raise SchemaError(f"{self.identifier}: {data.shape[0]} rows, expected 1")
+        # a copy: what comes from the middleware may be read-only
+        table = np.array(data, dtype=np.float64, order="C")
         if self.has_satellites:
-            block = self._checked_block(data)
-            for name, rows, shape in self._arrays:
-                values[name] = block[rows].reshape(shape)
+            arrays = self._decoded_satellites(table)
         elif self.has_rows:
-            values |= self._checked_rows(data)
-        record = self.record_type(gps_week=int(head[0]), tow_s=head[1], **values)
+            arrays = self._decoded_rows(table)
+        else:
+            self._check_head(table, -1, first_infinite(table))
+            arrays = {}
+        week, tow_s, *scalars = table[0, : self._n_head].tolist()
+        values: dict[str, Any] = dict(zip(self._scalars, scalars, strict=True))
+        record = self.record_type(gps_week=int(week), tow_s=tow_s, **values, **arrays)
         self._check_record(record)
         return record
 
-    def _checked_rows(self, data: FloatArray) -> dict[str, FloatArray]:
-        body = data[:, self._n_head :]
-        if len(body) == 1 and np.isnan(body).all():
-            body = body[:0]
-        self._rows.check(body)
-        return {name: body[:, place].copy() for place, name in enumerate(self._rows.names)}
-
-    def _checked_head(self, data: FloatArray) -> list[float]:
-        heads = data[:, : self._n_head]
-        first = heads[0]
-        if data.shape[0] > 1:
-            if not (self.has_satellites or self.has_rows):
-                raise SchemaError(f"{self.identifier}: {data.shape[0]} rows, expected 1")
-            same = (heads == first) | (np.isnan(heads) & np.isnan(first))
-            if not same.all():
-                column = self.columns[int(np.flatnonzero(~same.all(axis=0))[0])]
-                raise SchemaError(f"{self.identifier}: rows differ in {column}, which is one value for the table")
-        head: list[float] = first.tolist()
-        _check_epoch(self.identifier, head[0], head[1])
-        return head
-
-    def _checked_block(self, data: FloatArray) -> FloatArray:
-        block = np.full((self._n_block, N_SATS), np.nan)
-        sat = data[:, self._n_head]
-        body = data[:, self._n_head + 1 :]
-        if data.shape[0] == 1 and np.isnan(sat[0]):
-            if not np.isnan(body).all():
+    def _decoded_satellites(self, table: FloatArray) -> dict[str, FloatArray]:
+        block, differing, infinite, unknown, twice = satellite_columns(table, self._n_head, _INDEX_OF_SOURCE, N_SATS)
+        self._check_head(table, differing, infinite)
+        if unknown >= 0:
+            sat = table[unknown, self._n_head]
+            if len(table) == 1 and np.isnan(sat):
                 raise SchemaError(f"{self.identifier}: a row without satellite has values, expected a marker of NaN")
-            return block
-        block[:, self._checked_satellites(sat)] = body.T
-        return block
-
-    def _checked_satellites(self, sat: FloatArray) -> NDArray[np.int64]:
-        known = (sat >= 0) & (sat <= _MAX_SOURCE_ID)
-        ids = np.where(known, sat, 0.0).astype(np.int64)
-        index = _INDEX_OF_SOURCE[ids]
-        bad = ~known | (ids != sat) | (index < 0)
-        if bad.any():
-            raise SchemaError(f"{self.identifier}: sat {sat[bad][0]:g} is not a ranging source the suite knows")
-        if np.bincount(index).max() > 1:
-            twice = int(np.argmax(np.bincount(index)))
+            raise SchemaError(f"{self.identifier}: sat {sat:g} is not a ranging source the suite knows")
+        if twice >= 0:
             raise SchemaError(f"{self.identifier}: sat {RANGING_SOURCE_ID[twice]} has more than one row")
-        return index
+        return {name: block[rows].reshape(shape) for name, rows, shape in self._arrays}
+
+    def _decoded_rows(self, table: FloatArray) -> dict[str, FloatArray]:
+        block, differing, infinite = row_columns(table, self._n_head)
+        self._check_head(table, differing, infinite)
+        self._rows.check(block.ravel())
+        return dict(zip(self._rows.names, block, strict=True))
+
+    def _check_head(self, table: FloatArray, differing: int, infinite: int) -> None:
+        """Refuse rows of different epochs or scalars, an impossible epoch, an infinite value."""
+        if differing >= 0:
+            raise SchemaError(
+                f"{self.identifier}: rows differ in {self.columns[differing]}, which is one value for the table"
+            )
+        _check_epoch(self.identifier, float(table[0, 0]), float(table[0, 1]))
+        self._refuse_infinite(infinite)
+
+    def _refuse_infinite(self, column: int) -> None:
+        """Missing is NaN; an infinity is nobody's measurement."""
+        if column >= 0:
+            raise SchemaError(
+                f"{self.identifier}: {self.columns[column]} is infinite, expected a finite number or NaN for missing"
+            )
 
     def _label_difference(self, label: str) -> str:
         found, _, columns = label.partition(": ")
@@ -333,9 +325,8 @@ def _check_epoch(identifier: str, week: float, tow_s: float) -> None:
         raise SchemaError(f"{identifier}: tow_s is {tow_s!r}, expected 0 <= tow_s < {SECONDS_PER_WEEK:.0f}")
 
 
-def _check_finite_or_nan(identifier: str, columns: tuple[str, ...], table: FloatArray) -> None:
-    """Missing is NaN; an infinity is nobody's measurement."""
-    infinite = np.isinf(table)
-    if infinite.any():
-        column = columns[int(np.flatnonzero(infinite.any(axis=0))[0])]
-        raise SchemaError(f"{identifier}: {column} is infinite, expected a finite number or NaN for missing")
+def _getter(names: tuple[str, ...]) -> Callable[[Any], tuple[Any, ...]]:
+    """The values of these attributes, as a tuple whatever their number."""
+    if len(names) > 1:
+        return attrgetter(*names)
+    return lambda record: tuple(getattr(record, name) for name in names)
