@@ -55,20 +55,24 @@ def _turned(nominal: Ephemeris, params: WorldParams, satellites_a_system: int) -
     kept = np.zeros(N_SATS, dtype=bool)
     kept[:satellites_a_system] = kept[N_GPS : N_GPS + satellites_a_system] = True
     turns = np.arange(_STEPS) * (2.0 * np.pi / _STEPS)
-    node, along = (turn.reshape(-1, 1) for turn in np.meshgrid(turns, turns, indexing="ij"))
-    turned = _with(nominal, omega0_rad=nominal.omega0_rad + node, m0_rad=nominal.m0_rad + along)
-    high = (_elevations_rad(turned, params) >= _LOWEST_RAD).all(axis=0)
+    places_rad = [(node, along) for node in turns for along in turns]
+    orbits = [
+        _with(nominal, omega0_rad=nominal.omega0_rad + node, m0_rad=nominal.m0_rad + along)
+        for node, along in places_rad
+    ]
+    high = np.array([(_elevations_rad(orbit, params) >= _LOWEST_RAD).all(axis=0) for orbit in orbits])
     choice = np.zeros(N_SATS, dtype=np.int64)
     for number, satellite in enumerate(np.flatnonzero(kept)):
         places = np.flatnonzero(high[:, satellite])
         choice[satellite] = places[int(len(places) * (number * _GOLDEN % 1.0))]
-    angles = {name: _half_turn(getattr(turned, name)[choice, np.arange(N_SATS)]) for name in _ANGLES}
+    turn_rad = dict(zip(_ANGLES, np.array(places_rad)[choice].T, strict=True))
+    angles = {name: _half_turn(getattr(nominal, name) + turn_rad[name]) for name in _ANGLES}
     placed = _with(nominal, **angles)
     return _with(placed, **{name: np.where(kept, value, np.nan) for name, value in _arrays(placed).items()})
 
 
 def _elevations_rad(ephemeris: Ephemeris, params: WorldParams) -> FloatArray:
-    """Elevations (times, places, N_SATS) at the first receiver, at times spread over the run."""
+    """Elevations (times, N_SATS) at the first receiver, at times spread over the run."""
     position_m = np.array(params.receiver_ecef_m[0])
     latitude, longitude, _ = geodetic_from_ecef(position_m)
     up = rot_enu_ecef(latitude, longitude)[2]
