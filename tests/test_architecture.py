@@ -258,7 +258,6 @@ TOO_LARGE: dict[str, str] = {
     "gbas_ground/monitors/gradient_estimates.py:gradient_vectors": _EPOCH,
     "gbas_ground/monitors/ionosphere_gradient.py": _EPOCH,
     "gbas_ground/monitors/shared_receiver.py:shared_receiver": _EPOCH,
-    "gbas_studies/faults/campaign.py": _CAMPAIGN,
     "gbas_studies/faults/campaign.py:run_campaign": _CAMPAIGN,
     "gbas_studies/fronts/campaign.py:draw": _CAMPAIGN,
 }

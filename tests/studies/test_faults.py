@@ -13,12 +13,9 @@ from gbas_ground.params import GroundParams
 from gbas_sim.faults.kinds import CodeCarrierDivergence, ExcessiveAcceleration
 from gbas_sim.scenario import read_sections, scenario_from_yaml
 from gbas_studies.ccd.smoothed_error import Smoothing, StudyError, largest_error_s
-from gbas_studies.faults.campaign import KINDS, QUIET_S, WORLD_S, cases_of, run_campaign
-from gbas_studies.faults.exposure import (
-    TIME_TO_ALERT_S,
-    divergence_limit_s,
-    extrapolation_limit_s,
-)
+from gbas_studies.faults.campaign import QUIET_S, WORLD_S, run_campaign
+from gbas_studies.faults.cases import KINDS, cases_of
+from gbas_studies.faults.exposure import TIME_TO_ALERT_S, divergence_limit_s, extrapolation_limit_s
 from gbas_studies.faults.injection import inject, settle
 
 

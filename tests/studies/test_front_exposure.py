@@ -8,7 +8,7 @@ import pytest
 from gbas_core.ranging.divergence import AIRBORNE, divergence_step, initial_divergence
 from gbas_core.ranging.smoothing import SmoothingParams, initial_smoothing, smooth_step
 from gbas_studies.ccd.smoothed_error import LONG_BEFORE, Smoothing, StudyError
-from gbas_studies.faults.campaign import front_cases
+from gbas_studies.faults.cases import front_cases
 from gbas_studies.faults.front_exposure import Encounter, front_limit, slope_error_s
 
 FRONT_MPS, RADIUS_M, T_S = 100.0, 450.0, 0.5

@@ -43,9 +43,6 @@ _GROUND_OUTPUTS: Final = (
 _COMPARING_CAUSES: Final = ("_above_", "timeout")
 
 
-# --- contents
-
-
 @dataclass
 class _Series:
     """Epochs of a topic in order, with the index of each message."""

@@ -41,8 +41,9 @@ def faults(
     """
     from gbas_bringup.progress import progress
     from gbas_studies.faults import campaign
+    from gbas_studies.faults.cases import KINDS, cases_of
 
-    cases = campaign.cases_of(tuple(kind or campaign.KINDS), rates_mps=_rates(rates), modes=tuple(mode or ()))
+    cases = cases_of(tuple(kind or KINDS), rates_mps=_rates(rates), modes=tuple(mode or ()))
     world, station = _world(scenario)
     with progress("injecting", enabled=not as_json) as update:
         outcomes = campaign.run_campaign(

@@ -10,8 +10,6 @@ from typing import Any
 from gbas_core.parameters.declaration import Derived, Parameter
 from gbas_core.parameters.structure import bare_type, classes_in, default_of, file_key, hints_of, parameter_of
 
-# --- what is declared
-
 
 @dataclasses.dataclass(frozen=True)
 class Declared:

@@ -20,9 +20,6 @@ def json_schema(kind: type[Any]) -> dict[str, Any]:
     return adapter_of(kind).json_schema(by_alias=True, schema_generator=_InFileUnits)
 
 
-# --- inside
-
-
 class _InFileUnits(GenerateJsonSchema):
     """JSON Schemas whose defaults stand as a file has them; a section's are those of its keys."""
 

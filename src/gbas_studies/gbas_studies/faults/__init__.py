@@ -6,6 +6,7 @@ from observations to the bits of its bursts. Times are those of the data.
 ==========================  ==================================================================
 :mod:`~.injection`          one fault into a settled station, and when a burst first says so
 :mod:`~.exposure`           when the user's differential error passes its limit meanwhile
-:mod:`~.campaign`           many faults: every monitor, rates, onsets and seeds
+:mod:`~.cases`              kinds and sizes of faults: every monitor, rates
+:mod:`~.campaign`           many of them: onsets and seeds
 ==========================  ==================================================================
 """

@@ -1,6 +1,6 @@
 """Field tables of an approach: the FAS data block of message type 4 and the alert limits sent with it.
 
-Source: Annex 10 Volume I, Appendix B, tables B-66 and B-68 and RTCA DO-246E.
+Source: as :mod:`gbas_vdb.messages.tables`.
 """
 
 from __future__ import annotations

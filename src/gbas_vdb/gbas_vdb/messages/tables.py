@@ -1,4 +1,5 @@
-"""The field tables of the VDB messages, in the order of transmission: this module is data.
+"""The field tables of the VDB messages, in the order of transmission: this module is data. Those of an approach
+are in :mod:`gbas_vdb.messages.approach_tables`.
 
 Source: Annex 10 Volume I, Appendix B, tables B-62 to B-77 and RTCA DO-246E. Entries marked (uncertain) are
 reconstructed; see docs/conventions.md.
