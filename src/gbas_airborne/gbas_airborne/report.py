@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-call"
 """Last stage of an epoch: the record of every mode's position, with all a protection level needs."""
 
 from __future__ import annotations
@@ -5,15 +6,12 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-
 from gbas_airborne.navigation.guidance import approach_columns, guidance_columns
+from gbas_airborne.navigation.kernels.report import COLUMNS, used_columns
 from gbas_airborne.navigation.locate import Located
 from gbas_airborne.navigation.position import Fix, PositionResult
 from gbas_airborne.reception.receive import Received
 from gbas_airborne.reception.station_data import Corrections
-from gbas_core.positioning.wls import vertical_lateral
-from gbas_core.record import FloatArray
 from gbas_msgs_py.modes import Mode
 from gbas_msgs_py.records import SolutionEpoch
 
@@ -57,14 +55,13 @@ def _solution(received: Received, result: PositionResult) -> SolutionEpoch:
 
 
 def _position_columns(fix: Fix) -> dict[str, Any]:
-    clock_m = fix.clock_m()
+    x_m, y_m, z_m = fix.position_m.tolist()
     return {
-        "x_m": float(fix.position_m[0]),
-        "y_m": float(fix.position_m[1]),
-        "z_m": float(fix.position_m[2]),
+        "x_m": x_m,
+        "y_m": y_m,
+        "z_m": z_m,
         # that of the first constellation used
-        "clock_m": float(clock_m[np.isfinite(clock_m)][0]),
-        "n_sats": float(fix.used.sum()),
+        "clock_m": next(each for each in fix.clock_m.tolist() if math.isfinite(each)),
         # no mode yet compares two positions
         "d_vert_m": 0.0,
         "d_lat_m": 0.0,
@@ -74,26 +71,10 @@ def _position_columns(fix: Fix) -> dict[str, Any]:
 def _satellite_columns(
     received: Received, result: PositionResult, fix: Fix, corrections: Corrections
 ) -> dict[str, Any]:
-    """Rows of the satellites used."""
-    used, geometry, approach = fix.used, result.geometry, received.approach
-    s_vert, s_lat = vertical_lateral(fix.projection, approach.gpa_rad if approach is not None else 0.0)
-    b_m = np.where(used, corrections.b_m, np.nan)
-    behind = np.isfinite(b_m).sum(axis=0).max()
-
-    def only(values: FloatArray) -> FloatArray:
-        return np.where(used, values, np.nan)
-
-    return {
-        "n_receivers": float(max(behind, 1)),
-        "elevation_rad": only(geometry.elevation_rad),
-        "azimuth_rad": only(geometry.azimuth_rad),
-        "s_vert": only(s_vert),
-        "s_lat": only(s_lat),
-        "sigma_gnd_m": only(corrections.sigma_m),
-        "sigma_air_m": only(geometry.sigma_air_m),
-        "sigma_tropo_m": only(geometry.sigma_tropo_m),
-        "sigma_iono_m": only(geometry.sigma_iono_m),
-        "b_m": b_m,
-        "ephemeris_error_m": only(geometry.distance_m * received.checks.p),
-        "residual_m": fix.residual_m(),
-    }
+    """Rows of the satellites used, and how many of them and of receivers there are."""
+    tan_gpa = math.tan(received.approach.gpa_rad) if received.approach is not None else 0.0
+    rows, n_sats, n_receivers = used_columns(
+        result.reason, fix.sky, fix.projection, tan_gpa, corrections.columns, received.checks.columns, fix.distance_m
+    )
+    columns: dict[str, Any] = dict(zip(COLUMNS, rows, strict=False))
+    return {**columns, "b_m": rows[len(COLUMNS) :], "n_sats": float(n_sats), "n_receivers": float(n_receivers)}

@@ -10,7 +10,8 @@ import pytest
 
 from airborne_world import START_S, Flight, World, above, changed, constellation, only, position_of, station_data
 from gbas_airborne.params import AirborneParams
-from gbas_airborne.ranging.corrected_ranges import usable_b_values
+from gbas_airborne.ranging.kernels.corrected_ranges import single_receiver, usable_b_values
+from gbas_airborne.reception.columns import B_VALUES
 from gbas_core.satellites import N_SATS, SAT_IDS, missing
 from gbas_core.signals import L1, SPEED_OF_LIGHT_MPS
 from gbas_msgs_py.codes import EventKind, Rejection
@@ -126,11 +127,12 @@ def test_b_values() -> None:
     ],
 )
 def test_which_b_values_will_do(counts: list[int], n_receivers: int, usable: list[bool]) -> None:
-    b_m = missing(4)
+    corrections = missing(B_VALUES + 4)
     for satellite, count in enumerate(counts):
-        b_m[:count, satellite] = 0.1
-    listed = np.arange(N_SATS) < len(counts)
-    assert usable_b_values(b_m, n_receivers, listed)[: len(counts)].tolist() == usable
+        corrections[:B_VALUES, satellite] = 0.0
+        corrections[B_VALUES : B_VALUES + count, satellite] = 0.1
+    single = single_receiver(corrections, n_receivers)
+    assert [usable_b_values(corrections, single, place) for place in range(len(counts))] == usable
 
 
 def test_ephemeris_of_another_issue() -> None:

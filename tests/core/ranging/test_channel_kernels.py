@@ -1,11 +1,11 @@
-"""The compiled slip tests and filters against the same rules as array expressions, over all that may befall channels."""
+"""The compiled slip tests and filters against the same rules as array expressions, over what may befall channels."""
 
 from __future__ import annotations
 
-import array_channels as oracle
 import numpy as np
 import pytest
 
+import array_channels as oracle
 from gbas_core.ranging.slips import ChannelObservations, SlipParams, initial_slips, slip_step
 from gbas_core.ranging.smoothing import SmoothingParams, initial_smoothing, smooth_step
 from gbas_core.satellites import N_SATS

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gbas_airborne.modes import subject_prefix
-from gbas_airborne.navigation.position import PositionInputs, PositionResult, Prior, tested_position
+from gbas_airborne.navigation.position import PositionInputs, PositionResult, Prior, find_positions
 from gbas_airborne.params import AirborneParams
 from gbas_airborne.ranging.corrected_ranges import Corrected, RangingSources
 from gbas_airborne.reception.receive import Received
@@ -74,64 +74,63 @@ class Located:
 def locate(state: LocateState, corrected: Corrected, params: AirborneParams) -> tuple[LocateState, Located]:
     """A position of every mode, of its ranging sources."""
     received, states = corrected.received, dict(state.modes)
+    before = {each.mode.number: states.get(each.mode.number) or ModePosition() for each in corrected.sources}
+    inputs = [made for each in corrected.sources if (made := _inputs(before[each.mode.number], received, each, params))]
+    found: dict[int, PositionResult] = {}
+    if inputs and received.station is not None:
+        positions = find_positions(inputs, received.station, received.approach, params)
+        found = {result.sources.mode.number: result for result in positions}
     results: list[PositionResult] = []
-    events: list[Event] = []
-    for sources in corrected.sources:
-        mode = sources.mode
-        before = states.get(mode.number, ModePosition())
-        result = _position(before, received, sources, params)
-        events += _changes(before.reason, result, received, params)
-        states[mode.number] = _after(before, received, result, params)
+    events: tuple[Event, ...] = ()
+    for each in corrected.sources:
+        number = each.mode.number
+        result = found.get(number) or PositionResult(sources=each, reason=each.reason)
+        events += _changes(before[number].reason, result, received, params)
+        states[number] = _after(before[number], received, result, params)
         results.append(result)
-    return LocateState(modes=states), Located(received=received, results=tuple(results), events=tuple(events))
+    return LocateState(modes=states), Located(received=received, results=tuple(results), events=events)
 
 
-def _position(
+def _inputs(
     before: ModePosition, received: Received, sources: RangingSources, params: AirborneParams
-) -> PositionResult:
-    """A position without the satellites that are held out."""
-    held = (sources.reason == int(Rejection.NONE)) & (before.held_until_ms > received.epoch_ms)
-    if held.any():
-        sources = replace(sources, reason=np.where(held, int(Rejection.RANGE_TEST), sources.reason))
+) -> PositionInputs | None:
+    """What the position of a mode is made of, without the satellites that are held out; None without corrections."""
     station, corrections = received.station, received.corrections.get(sources.mode.product)
     if station is None or corrections is None:
-        return PositionResult(sources=sources, reason=sources.reason)
-    inputs = PositionInputs(
-        sources=sources,
-        corrections=corrections,
-        station=station,
-        approach=received.approach,
-        prior=_prior(before, received, station, params),
-    )
-    return tested_position(inputs, params)
+        return None
+    held = (sources.reason == int(Rejection.NONE)) & (before.held_until_ms > received.epoch_ms)
+    reason = np.where(held, int(Rejection.RANGE_TEST), sources.reason)
+    return PositionInputs(sources, reason, corrections, _prior(before, received, station, params))
 
 
 def _prior(before: ModePosition, received: Received, station: StationData, params: AirborneParams) -> Prior:
     """Where to start, and what the own speed is estimated from: the last position if it is recent enough."""
     if before.fix_m is None or before.fix_ms is None:
-        return Prior(start_m=station.reference_ecef_m)
+        return Prior(station.reference_ecef_m, recent=False, dt_s=math.nan)
     dt_s = (received.epoch_ms - before.fix_ms) / 1000.0
-    if 0.0 < dt_s <= params.speed_history_s:
-        return Prior(start_m=before.fix_m, previous_m=before.fix_m, dt_s=dt_s)
-    return Prior(start_m=before.fix_m)
+    return Prior(before.fix_m, recent=0.0 < dt_s <= params.speed_history_s, dt_s=dt_s)
 
 
 def _after(before: ModePosition, received: Received, result: PositionResult, params: AirborneParams) -> ModePosition:
-    tripped = np.isfinite(result.range_error_m)
-    until_ms = received.epoch_ms + 1000.0 * params.range_test_hold_s
-    after = replace(before, reason=result.reason, held_until_ms=np.where(tripped, until_ms, before.held_until_ms))
-    if result.fix is None:
-        return after
-    return replace(after, fix_ms=received.epoch_ms, fix_m=result.fix.position_m)
+    held_until_ms, error_m = before.held_until_ms, result.range_error_m
+    if error_m is not None and (tripped := np.isfinite(error_m)).any():
+        held_until_ms = np.where(tripped, received.epoch_ms + 1000.0 * params.range_test_hold_s, held_until_ms)
+    fix_ms, fix_m = before.fix_ms, before.fix_m
+    if result.fix is not None:
+        fix_ms, fix_m = received.epoch_ms, result.fix.position_m
+    return ModePosition(fix_ms=fix_ms, fix_m=fix_m, reason=result.reason, held_until_ms=held_until_ms)
 
 
 def _changes(
     before: NDArray[np.int64], result: PositionResult, received: Received, params: AirborneParams
 ) -> tuple[Event, ...]:
     """An event for each satellite whose reason changed."""
+    changed = before != result.reason
+    if not changed.any():
+        return ()
     prefix = subject_prefix(result.sources.mode.number, params)
     events = EventLog(received.gps_week, received.tow_s, SOURCE)
-    for index in np.flatnonzero(before != result.reason):
+    for index in np.flatnonzero(changed):
         old, new = Rejection(before[index]), Rejection(result.reason[index])
         if new is Rejection.NONE:
             events.add(EventKind.READMISSION, prefix + SAT_IDS[index], "used")
@@ -157,13 +156,17 @@ def _evidence(
         Rejection.EPHEMERIS_CRC_MISSING: (sources.own_crc[index], math.nan),
         Rejection.EPHEMERIS_CRC_MISMATCH: (sources.own_crc[index], received.checks.crc[index]),
         Rejection.NOT_SETTLED: (sources.settled_s[index], params.settle_s),
-        Rejection.DISTANCE: (result.geometry.distance_m, station.d_max_m),
+        Rejection.DISTANCE: (result.distance_m, station.d_max_m),
         Rejection.ELEVATION: (
-            math.degrees(result.geometry.elevation_rad[index]),
+            math.degrees(_at(result.elevation_rad, index)),
             math.degrees(params.elevation_mask_rad),
         ),
-        Rejection.RANGE_TEST: (result.range_error_m[index], params.range_test_floor_m),
+        Rejection.RANGE_TEST: (_at(result.range_error_m, index), params.range_test_floor_m),
     }
     about_ephemeris = Rejection.EPHEMERIS_IOD <= reason <= Rejection.EPHEMERIS_CRC_MISMATCH
     subject = f"{satellite}/iod{iod:.0f}" if about_ephemeris and math.isfinite(iod) else satellite
     return subject, *numbers.get(reason, (math.nan, math.nan))
+
+
+def _at(values: FloatArray | None, index: int) -> float:
+    return math.nan if values is None else float(values[index])

@@ -11,6 +11,7 @@ from typing import Final
 
 import numpy as np
 
+from gbas_airborne.reception.columns import B_VALUES, IOD, SIGMA
 from gbas_core.gnss.frames import ecef_from_geodetic
 from gbas_core.positioning.approach import FinalApproach
 from gbas_core.record import FloatArray
@@ -50,28 +51,55 @@ class StationData:
 class Corrections:
     """A complete set of corrections of one product (one message, or a linked pair) on the satellite axis.
 
-    `gps_week`, `tow_s` are the modified Z-count, resolved, `received` is the start of the frame it came in. `sigma_m`
-    is NaN where the correction is invalid, `listed` is 1 where there is one at all, `b_m` is (4, N_SATS).
+    `gps_week`, `tow_s` are the modified Z-count, resolved, `received` is the start of the frame it came in. The sigma
+    is NaN where the correction is invalid, `listed` is 1 where there is one at all.
     """
 
     gps_week: int
     tow_s: float
     received: tuple[int, float]
-    listed: FloatArray
-    iod: FloatArray
-    prc_m: FloatArray
-    rrc_mps: FloatArray
-    sigma_m: FloatArray
-    b_m: FloatArray
+    columns: FloatArray
+    """``(rows, N_SATS)``: listed, issue of data, PRC [m], RRC [m/s], sigma [m], and a B value [m] for each receiver."""
+
+    @property
+    def iod(self) -> FloatArray:
+        """Issues of data of the corrections' ephemerides."""
+        iod: FloatArray = self.columns[IOD]
+        return iod
+
+    @property
+    def b_m(self) -> FloatArray:
+        """B values ``(MAX_REFERENCE_RECEIVERS, N_SATS)`` [m]."""
+        b_m: FloatArray = self.columns[B_VALUES:]
+        return b_m
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class EphemerisChecks:
-    """What type 1 messages said about ephemerides, per satellite: the last issue of data, its CRC and P."""
+    """What type 1 messages said about ephemerides, per satellite: the last issue of data, its CRC and P.
 
-    iod: FloatArray = field(default_factory=missing)
-    crc: FloatArray = field(default_factory=missing)
-    p: FloatArray = field(default_factory=missing)
+    These are the rows of `columns`, ``(3, N_SATS)``.
+    """
+
+    columns: FloatArray = field(default_factory=lambda: missing(3))
+
+    @property
+    def iod(self) -> FloatArray:
+        """Issues of data."""
+        row: FloatArray = self.columns[0]
+        return row
+
+    @property
+    def crc(self) -> FloatArray:
+        """CRCs of the ephemerides with these."""
+        row: FloatArray = self.columns[1]
+        return row
+
+    @property
+    def p(self) -> FloatArray:
+        """P, decorrelation of the ephemeris error [m/m]."""
+        row: FloatArray = self.columns[2]
+        return row
 
 
 def correction_set(
@@ -82,25 +110,14 @@ def correction_set(
     A source listed twice contradicts itself: its sigma becomes NaN, so that it is not used.
     """
     known = [(SOURCE_ID_INDEX[m.ranging_source_id], m) for m in measurements if m.ranging_source_id in SOURCE_ID_INDEX]
-    columns = missing(5 + MAX_REFERENCE_RECEIVERS)
+    columns = missing(B_VALUES + MAX_REFERENCE_RECEIVERS)
     if known:
         index = [number for number, _ in known]
         rows = [(1.0, m.iod, m.prc_m, m.rrc_mps, m.sigma_pr_gnd_m, *m.b_values_m) for _, m in known]
         columns[:, index] = np.array(rows, dtype=np.float64).T
         if len(set(index)) != len(index):
-            columns[4, [number for number in index if index.count(number) > 1]] = np.nan
-    columns.flags.writeable = False
-    return Corrections(
-        gps_week=z_count[0],
-        tow_s=z_count[1],
-        received=received,
-        listed=columns[0],
-        iod=columns[1],
-        prc_m=columns[2],
-        rrc_mps=columns[3],
-        sigma_m=columns[4],
-        b_m=columns[5:],
-    )
+            columns[SIGMA, [number for number in index if index.count(number) > 1]] = np.nan
+    return Corrections(gps_week=z_count[0], tow_s=z_count[1], received=received, columns=columns)
 
 
 def station_data(message: Type2) -> StationData:

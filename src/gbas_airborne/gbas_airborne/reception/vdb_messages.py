@@ -13,8 +13,6 @@ import math
 from dataclasses import fields, replace
 from typing import Final
 
-import numpy as np
-
 from gbas_airborne.modes import PRODUCT_OF_MEASUREMENT
 from gbas_airborne.params import NO_FAS, AirborneParams
 from gbas_airborne.reception.station_data import (
@@ -255,9 +253,9 @@ class _VdbMessageProcessor:
         told = (float(first.iod), float(message.ephemeris_crc), message.ephemeris_decorrelation)
         checks = self.state.checks
         if told != (checks.iod[index], checks.crc[index], checks.p[index]):
-            columns = np.array([checks.iod, checks.crc, checks.p])
+            columns = checks.columns.copy()
             columns[:, index] = told
-            self.state = replace(self.state, checks=EphemerisChecks(iod=columns[0], crc=columns[1], p=columns[2]))
+            self.state = replace(self.state, checks=EphemerisChecks(columns=columns))
 
     def _take_corrections(self, message: Type1, measurements: tuple[Correction100, ...], burst: Burst) -> None:
         """A complete set of corrections of the message's product."""

@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-call"
 """Broadcast ephemerides on the satellite axis."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-call"
 """Earth-fixed frames: geodetic coordinates, local axes, lines of sight and elevations.
 
 ECEF is WGS 84 (for Galileo GTRF, which agrees within centimetres). Receiver positions are ``(..., 3)``; vectors to

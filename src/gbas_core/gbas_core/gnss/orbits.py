@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-call"
 """Satellite positions, velocities and clocks from broadcast ephemerides, on the satellite axis.
 
 Every function takes an :class:`~gbas_core.gnss.ephemeris.Ephemeris` and arrays whose trailing axis is the satellite

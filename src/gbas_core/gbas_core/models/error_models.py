@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-call"
 """Error models of the standard: what each part of a corrected pseudorange may be wrong by.
 
 One published model a function. Elevations are radians and broadcast against the rest. An elevation below the mask, or a
@@ -28,7 +29,7 @@ GAD_C_STEP_DEG: Final = 35.0
 # Known: radius of the Earth and height of the thin shell in the obliquity factor.
 IONO_EARTH_RADIUS_M: Final = 6_378_136.3
 IONO_SHELL_HEIGHT_M: Final = 350_000.0
-_EDGE_DEG: Final = 1e-9  # rounding of an elevation that is meant to be on the mask or the step
+EDGE_DEG: Final = 1e-9  # rounding of an elevation that is meant to be on the mask or the step
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,10 +70,34 @@ L5_MULTIPATH_SURROGATE: Final = AirborneCurve(a0_m=0.08, a1_m=0.20, theta0_deg=1
 E1_GROUND_FACTOR_SURROGATE: Final = 0.9
 
 
+# --- formulas, on numbers and on arrays; compiled loops use them on numbers
+
+
+def curve_m(theta_deg, a0_m, a1_m, theta0_deg):  # type: ignore[no-untyped-def]
+    """``a0 + a1 exp(-theta / theta0)`` [m]."""
+    return a0_m + a1_m * np.exp(-theta_deg / theta0_deg)
+
+
+def tropo_m(refractivity, scale_m, sine, height_m):  # type: ignore[no-untyped-def]
+    """TC of :func:`tropo_correction_m`; `sine` is that of the elevation [m]."""
+    return refractivity * scale_m * 1e-6 / np.sqrt(0.002 + sine**2) * -np.expm1(-height_m / scale_m)
+
+
+def obliquity(elevation_rad):  # type: ignore[no-untyped-def]
+    """F_pp of :func:`iono_obliquity` [-]."""
+    ratio = IONO_EARTH_RADIUS_M / (IONO_EARTH_RADIUS_M + IONO_SHELL_HEIGHT_M) * np.cos(elevation_rad)
+    return 1.0 / np.sqrt(1.0 - ratio**2)
+
+
+def iono_m(factor, gradient, distance_m, speed_mps, tau_s):  # type: ignore[no-untyped-def]
+    """:func:`sigma_iono_m` with an obliquity [m]."""
+    return factor * gradient * (distance_m + 2.0 * tau_s * speed_mps)
+
+
 def _elevation_deg(elevation_rad: ArrayLike, mask_rad: float) -> FloatArray:
     """Elevation in degrees, NaN below the mask."""
     elevation_deg = np.rad2deg(np.asarray(elevation_rad, dtype=np.float64))
-    return np.where(elevation_deg >= np.rad2deg(mask_rad) - _EDGE_DEG, elevation_deg, np.nan)
+    return np.where(elevation_deg >= np.rad2deg(mask_rad) - EDGE_DEG, elevation_deg, np.nan)
 
 
 def ground_curve_m(
@@ -82,7 +107,7 @@ def ground_curve_m(
     theta_deg = _elevation_deg(elevation_rad, mask_rad)
     number = np.asarray(n_receivers, dtype=np.float64)
     number = np.where(number >= 1.0, number, np.nan)
-    single = curve.a0_m + curve.a1_m * np.exp(-theta_deg / curve.theta0_deg)
+    single = curve_m(theta_deg, curve.a0_m, curve.a1_m, curve.theta0_deg)
     result: FloatArray = np.sqrt(single**2 / number + curve.a2_m**2)
     return result
 
@@ -90,8 +115,7 @@ def ground_curve_m(
 def airborne_curve_m(curve: AirborneCurve, elevation_rad: ArrayLike, *, mask_rad: float = MASK_RAD) -> FloatArray:
     """Airborne error of `curve` [m]."""
     theta_deg = _elevation_deg(elevation_rad, mask_rad)
-    result: FloatArray = curve.a0_m + curve.a1_m * np.exp(-theta_deg / curve.theta0_deg)
-    return result
+    return np.asarray(curve_m(theta_deg, curve.a0_m, curve.a1_m, curve.theta0_deg))
 
 
 def sigma_pr_gnd(
@@ -127,7 +151,7 @@ def sigma_pr_gnd(
     if gad == "C":
         high = ground_curve_m(GAD_C_HIGH, elevation_rad, n_receivers, mask_rad=mask_rad)
         low = ground_curve_m(GAD_C_LOW, elevation_rad, n_receivers, mask_rad=mask_rad)
-        return np.where(np.rad2deg(np.asarray(elevation_rad)) > GAD_C_STEP_DEG + _EDGE_DEG, high, low)
+        return np.where(np.rad2deg(np.asarray(elevation_rad)) > GAD_C_STEP_DEG + EDGE_DEG, high, low)
     raise ValueError(f"ground accuracy designator {gad!r} is not A, B or C")
 
 
@@ -194,9 +218,8 @@ def tropo_correction_m(
     scale_m = np.asarray(scale_height_m, dtype=np.float64)
     scale_m = np.where(scale_m > 0.0, scale_m, np.nan)
     sine = np.sin(np.deg2rad(_elevation_deg(elevation_rad, mask_rad)))
-    profile = -np.expm1(-np.asarray(height_difference_m, dtype=np.float64) / scale_m)
-    result: FloatArray = np.asarray(refractivity) * scale_m * 1e-6 / np.sqrt(0.002 + sine**2) * profile
-    return result
+    height_m = np.asarray(height_difference_m, dtype=np.float64)
+    return np.asarray(tropo_m(np.asarray(refractivity), scale_m, sine, height_m))
 
 
 def sigma_tropo_m(
@@ -225,9 +248,7 @@ def iono_obliquity(elevation_rad: ArrayLike) -> FloatArray:
     """
     elevation = np.asarray(elevation_rad, dtype=np.float64)
     elevation = np.where(elevation >= 0.0, elevation, np.nan)
-    ratio = IONO_EARTH_RADIUS_M / (IONO_EARTH_RADIUS_M + IONO_SHELL_HEIGHT_M) * np.cos(elevation)
-    result: FloatArray = 1.0 / np.sqrt(1.0 - ratio**2)
-    return result
+    return np.asarray(obliquity(elevation))
 
 
 def sigma_iono_m(
@@ -264,6 +285,5 @@ def sigma_iono_m(
     """
     factors = [np.asarray(value, dtype=np.float64) for value in (sigma_vig, distance_m, speed_mps, tau_s)]
     gradient, distance, speed, tau = (np.where(value >= 0.0, value, np.nan) for value in factors)
-    obliquity = iono_obliquity(np.deg2rad(_elevation_deg(elevation_rad, mask_rad)))
-    result: FloatArray = obliquity * gradient * (distance + 2.0 * tau * speed)
-    return result
+    factor = iono_obliquity(np.deg2rad(_elevation_deg(elevation_rad, mask_rad)))
+    return np.asarray(iono_m(factor, gradient, distance, speed, tau))

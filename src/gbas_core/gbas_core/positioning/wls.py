@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-call"
 """Weighted least squares: from ranges to position, and the projection matrix protection levels are made of.
 
 The design row of satellite i is ``[-e_x, -e_y, -e_z, clock...]``, e being the unit vector from the receiver to the
@@ -20,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gbas_core.gnss.orbits import rotated_range
+from gbas_core.positioning.kernels.wls import project
 from gbas_core.record import BoolArray, FloatArray
 
 # Uncertain, ours: bound on the condition number of the weighted design. Usable geometries are below about 100; beyond
@@ -94,18 +96,11 @@ def projection_matrix(
     """
     groups = np.atleast_2d(np.asarray(clock_groups, dtype=bool))
     _check_shapes(los, sigma_m, groups)
-    used = used_satellites(los, sigma_m, groups)
-    kept = np.concatenate([np.ones(3, dtype=bool), (groups & used).any(axis=1)])
-    if np.count_nonzero(used) < np.count_nonzero(kept) or not kept[3:].any():
-        return None
-    design = np.concatenate([-los, groups])[kept].compress(used, axis=1).T
-    weight = 1.0 / sigma_m[used]
-    left, singular, right = np.linalg.svd(weight[:, np.newaxis] * design, full_matrices=False)
-    if not singular[0] <= max_condition * singular[-1]:
-        return None
-    projection = np.zeros((3 + len(groups), los.shape[1]))
-    projection[np.ix_(kept, used)] = (right.T / singular) @ left.T * weight
-    return projection
+    group = np.where(groups.any(axis=0), groups.argmax(axis=0), -1)
+    projection = np.empty((3 + len(groups), los.shape[1]))
+    sigma = np.array(sigma_m, dtype=np.float64)
+    found = project(np.array(los, dtype=np.float64), sigma, group, len(groups), float(max_condition), projection)
+    return projection if found else None
 
 
 def _check_shapes(los: FloatArray, sigma_m: FloatArray, groups: BoolArray) -> None:
@@ -117,6 +112,11 @@ def _check_shapes(los: FloatArray, sigma_m: FloatArray, groups: BoolArray) -> No
         )
     if (groups.sum(axis=0) > 1).any():
         raise ValueError("clock_groups: a satellite is in more than one group")
+
+
+def vertical_projection(s_x, s_z, tan_gpa):  # type: ignore[no-untyped-def]
+    """Projection on the vertical error relative to the glide path, of numbers or arrays: ``s_z + s_x tan(GPA)``."""
+    return s_z + s_x * tan_gpa
 
 
 def vertical_lateral(projection: FloatArray, gpa_rad: float) -> tuple[FloatArray, FloatArray]:
@@ -136,7 +136,7 @@ def vertical_lateral(projection: FloatArray, gpa_rad: float) -> tuple[FloatArray
 
     Source: ICAO Annex 10 Vol. I, App. B 3.6.5.5.1.1.2.
     """
-    s_vert: FloatArray = projection[..., 2, :] + projection[..., 0, :] * np.tan(gpa_rad)
+    s_vert: FloatArray = vertical_projection(projection[..., 0, :], projection[..., 2, :], np.tan(gpa_rad))
     return s_vert, projection[..., 1, :]
 
 

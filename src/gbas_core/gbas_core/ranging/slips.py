@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-call"
 """Cycle slips and code jumps: where a carrier-smoothed range must start anew.
 
 Every test compares one epoch with what the epochs before it predict, so a satellite's first epoch is never flagged (its

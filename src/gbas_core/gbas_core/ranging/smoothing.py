@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-call"
 """Carrier smoothing of code ranges: the Hatch filter both ends of a GBAS run.
 
 The filter is ``P_n = w R_n + (1 - w) (P_{n-1} + phi_n - phi_{n-1})``, ``P_1 = R_1``, with ``w = T / tau`` once it has
@@ -151,7 +152,8 @@ def smooth_step(
         count=state.count.reshape(rows),
         elapsed_s=state.elapsed_s.reshape(rows),
     )
-    code, carrier, slip = (np.ascontiguousarray(each).reshape(rows) for each in (code_m, carrier_m, slipped))
+    code, carrier = (np.ascontiguousarray(each, dtype=np.float64).reshape(rows) for each in (code_m, carrier_m))
+    slip = np.ascontiguousarray(slipped, dtype=np.bool_).reshape(rows)
     after, smoothed_m = smooth_bands(before, code, carrier, slip, _FIRST, dt_s, params)
     new = SmoothingState(
         smoothed_m=smoothed_m.reshape(len(params.tau_s), *shape),

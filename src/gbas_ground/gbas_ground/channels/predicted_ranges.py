@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-call"
 """What each reference receiver should measure, from its surveyed position and the broadcast ephemerides."""
 
 from __future__ import annotations

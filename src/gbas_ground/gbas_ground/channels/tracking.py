@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-call"
 """What each reference receiver measured, slips found and smoothed by :mod:`gbas_core.ranging.channel_filter`.
 
 Axes are receivers, bands and satellites, ``(R, N_BANDS, N)``. A receiver that misses an epoch keeps its filters: when
@@ -20,17 +21,16 @@ from gbas_core.ranging.channel_filter import (
     FilteredChannels,
     channel_filter_step,
     initial_channel_filter,
-    sensible,
 )
 from gbas_core.ranging.slips import ChannelObservations, SlipParams, SlipState
 from gbas_core.ranging.smoothing import SmoothingParams, SmoothingState
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import missing
 from gbas_core.signals import L1, N_BANDS
+from gbas_ground.channels.kernels.channels import keep_sensible
 from gbas_ground.params import GroundParams
 
 _OBSERVED: Final = ("code_m", "carrier_m", "doppler_hz", "cn0_dbhz", "lli")
-_MAX_LLI: Final = 9  # one decimal digit in RINEX
 SMOOTHED_BANDS: Final = (L1,)
 """Bands whose codes are smoothed: those there are corrections of."""
 
@@ -46,6 +46,10 @@ class RawEpoch(NamedTuple):
     present: BoolArray
     """Receivers that delivered this epoch, ``(R,)``."""
 
+    def channels(self, range_m: FloatArray) -> ChannelObservations:
+        """What slips are sought in; with known ranges ``(R, N)`` [m]."""
+        return ChannelObservations(self.code_m, self.carrier_m, self.doppler_hz, self.lli, range_m)
+
 
 def stack(observations: Sequence[ObservationEpoch | None], satellites: BoolArray) -> RawEpoch:
     """Bring the receivers' records of one epoch together; nonsense and satellites not in use become missing."""
@@ -54,9 +58,9 @@ def stack(observations: Sequence[ObservationEpoch | None], satellites: BoolArray
         if each is not None:
             for place, name in enumerate(_OBSERVED):
                 values[place, row] = getattr(each, name)
-    code, carrier, doppler, cn0, lli = np.where(satellites, sensible(values), np.nan)
-    lli = np.where((lli < 0.0) | (lli > _MAX_LLI), 1.0, lli)  # an indicator that means nothing counts as lock lost
+    keep_sensible(values, satellites)
     present = np.array([each is not None for each in observations])
+    code, carrier, doppler, cn0, lli = values
     return RawEpoch(code, carrier, doppler, cn0, lli, present)
 
 
@@ -110,6 +114,9 @@ def track(
     filters : ChannelFilterParams
         As the groups began with.
     """
+    if len(groups) == 1 and raw.present.all():
+        state, tracks = channel_filter_step(groups[0].filters, raw.channels(range_m), epoch_ms, filters)
+        return (TrackGroup(receivers=groups[0].receivers, filters=state),), tracks
     n_receivers, n_bands = len(raw.present), len(filters.bands)
     smoothed_m = missing(len(filters.smoothing.tau_s), n_receivers, n_bands)
     age_s = missing(n_receivers, n_bands)
@@ -122,10 +129,7 @@ def track(
             waiting.append(_part(group, away))
         if here:
             rows = list(here)
-            every = slice(None) if len(rows) == n_receivers else rows
-            observed = ChannelObservations(
-                raw.code_m[every], raw.carrier_m[every], raw.doppler_hz[every], raw.lli[every], range_m[every]
-            )
+            observed = ChannelObservations(*(each[rows] for each in raw.channels(range_m) if each is not None))
             state, found = channel_filter_step(_part(group, here).filters, observed, epoch_ms, filters)
             smoothed_m[:, rows], age_s[rows] = found.smoothed_m, found.age_s
             carrier_m[rows], slipped[rows] = found.carrier_m, found.slipped

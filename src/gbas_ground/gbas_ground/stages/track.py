@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-call"
 """Track: ranges predicted, channels checked against them, and smoothed."""
 
 from __future__ import annotations
@@ -9,11 +10,11 @@ import numpy as np
 
 from gbas_core.ranging.predicted_ranges import PredictedRanges
 from gbas_core.record import BoolArray, FloatArray
-from gbas_core.signals import L1, SPEED_OF_LIGHT_MPS
+from gbas_core.signals import L1
+from gbas_ground.channels.kernels.channels import compare, finish
 from gbas_ground.channels.predicted_ranges import predict_ranges
 from gbas_ground.channels.tracking import RawEpoch, TrackGroup, Tracks, track
 from gbas_ground.consistency import Exclusions
-from gbas_ground.corrections.formation import range_correction_m
 from gbas_ground.monitors.expected_range import check_expected_range
 from gbas_ground.monitors.interface import Verdict
 from gbas_ground.monitors.monitor_table import Summaries, summarise
@@ -70,43 +71,51 @@ class Tracked(NamedTuple):
 def track_channels(state: TrackState, received: Received, station: PreparedStation) -> tuple[TrackState, Tracked]:
     """Check the channels, exclude what fails, and smooth the rest."""
     now, raw, params = received.now, received.raw, station.params
-    code_m = raw.code_m[:, L1]
-    predicted = predict_ranges(received.known.current, now.gps_week, now.tow_s, code_m, station.site)
-    tracked = np.isfinite(code_m + raw.carrier_m[:, L1])
-    checks = _channel_checks(raw, predicted, tracked, params)
+    predicted = predict_ranges(received.known.current, now.gps_week, now.tow_s, raw.code_m[:, L1], station.site)
+    tracked, comparable, correction_m, known_m = compare(
+        raw.code_m, raw.carrier_m, predicted.range_m, predicted.clock_s, received.changed
+    )
+    checks = _channel_checks(raw, correction_m, tracked, comparable, params)
     excluding = checks if params.signal_power.exclude else checks[:1]
     exclusions = exclude_channels(received.exclusions, excluding, now.events)
     far = _far_receivers(checks[0].result, params)
     exclusions = exclude_receivers(exclusions, far, ExclusionCause.RECEIVER_FAULT, now.events)
     clean = _without(raw, checks[0].result.failed)
-    comparable_m = _comparable_range_m(predicted, received.changed)
-    groups, tracks = track(state.groups, clean, now.epoch_ms, comparable_m, station.filters)
-    correction_m = range_correction_m(predicted.range_m, tracks.smoothed_of(L1), predicted.clock_s)
+    groups, tracks = track(state.groups, clean, now.epoch_ms, known_m, station.filters)
+    smoothed_correction_m, settled = finish(
+        tracks.smoothed_m, tracks.age_s, tracks.bands.index(L1), predicted.range_m, predicted.clock_s,
+        predicted.elevation_rad, params.monitors.elevation_mask_rad, params.smoothing.settle_time_s,
+    )  # fmt: skip
     return TrackState(groups=groups), Tracked(
         received=received,
         raw=clean,
         predicted=predicted,
         tracked=tracked,
-        channel_ok=tracked & ~np.logical_or.reduce([check.result.failed for check in excluding]),
-        settled=_settled(tracks, correction_m, predicted, params),
+        channel_ok=_passing(tracked, excluding),
+        settled=settled,
         tracks=tracks,
-        correction_m=correction_m,
+        correction_m=smoothed_correction_m,
         summaries={key: summarise(check.result, tracked) for key, check in zip(_CHECKS, checks, strict=True)},
         exclusions=exclusions,
     )
 
 
 def _channel_checks(
-    raw: RawEpoch, predicted: PredictedRanges, tracked: BoolArray, params: GroundParams
+    raw: RawEpoch, correction_m: FloatArray, tracked: BoolArray, comparable: BoolArray, params: GroundParams
 ) -> tuple[Verdict, ...]:
     """Monitors of single channels, each ``(R, N)``; the first also keeps measurements out of the filters."""
-    raw_correction = range_correction_m(predicted.range_m, raw.code_m[:, L1], predicted.clock_s)
-    comparable = tracked & np.isfinite(predicted.clock_s)
-    residual = check_expected_range(raw_correction, comparable, params.expected_range.max_residual_m)
+    residual = check_expected_range(correction_m, comparable, params.expected_range.max_residual_m)
     power = check_signal_power(
         raw.cn0_dbhz[:, L1], tracked, params.signal_power.min_cn0_dbhz, required=params.signal_power.require_cn0
     )
     return tuple(Verdict(TESTS[key][1].cause, result) for key, result in zip(_CHECKS, (residual, power), strict=True))
+
+
+def _passing(tracked: BoolArray, checks: tuple[Verdict, ...]) -> BoolArray:
+    """Channels that are tracked and pass these checks."""
+    for check in checks:
+        tracked = tracked & ~check.result.failed
+    return tracked
 
 
 def _far_receivers(residual: MonitorResult, params: GroundParams) -> MonitorResult:
@@ -127,15 +136,3 @@ def _without(raw: RawEpoch, failed: BoolArray) -> RawEpoch:
     if not failed.any():
         return raw
     return raw._replace(code_m=np.where(failed[:, np.newaxis, :], np.nan, raw.code_m))
-
-
-def _comparable_range_m(predicted: PredictedRanges, changed: BoolArray) -> FloatArray:
-    """Expected ranges for the slip tests, missing where another ephemeris would look like a slip."""
-    range_m = predicted.range_m - SPEED_OF_LIGHT_MPS * predicted.clock_s
-    return np.where(changed, np.nan, range_m)
-
-
-def _settled(tracks: Tracks, correction_m: FloatArray, predicted: PredictedRanges, params: GroundParams) -> BoolArray:
-    """Channels whose filters have run long enough, of satellites above the mask, ``(R, N)``."""
-    high = predicted.elevation_rad >= params.monitors.elevation_mask_rad
-    return np.isfinite(correction_m).all(axis=0) & (tracks.age_of(L1) >= params.smoothing.settle_time_s) & high

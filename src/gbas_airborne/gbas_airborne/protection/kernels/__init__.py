@@ -1,0 +1,1 @@
+"""Compiled loops, and the formulas they are made of."""

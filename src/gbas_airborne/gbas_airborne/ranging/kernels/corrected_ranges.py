@@ -1,0 +1,176 @@
+# mypy: disable-error-code="no-untyped-call, no-untyped-def"
+"""Corrected ranges of all modes of an epoch, and why the others are not used. Missing is NaN: it never passes a rule.
+
+The first axis of arrays is the mode.
+
+Source: ICAO Annex 10 vol. I, App. B 3.6.5.2; RTCA DO-253 2.3.8.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from gbas_airborne.reception.columns import B_VALUES, IOD, LISTED, PRC, RRC, SIGMA
+from gbas_core.compiled import compiled
+from gbas_core.gnss.ephemeris import FIELDS
+from gbas_core.gnss.kernels.orbits import transmit_place
+from gbas_core.signals import L1, SPEED_OF_LIGHT_MPS
+from gbas_msgs_py.codes import Rejection
+
+MODEL_TAU_S: Final = 100.0
+"""The airborne sigma models are those of code smoothed over this time."""
+_YOUNGEST_S: Final = 0.5  # a filter is never taken to be younger than one epoch of the VDB's rate
+_OWN_IOD: Final = FIELDS.index("iod")
+
+_NONE, _NOT_TRACKED, _SYSTEM = int(Rejection.NONE), int(Rejection.NOT_TRACKED), int(Rejection.SYSTEM)
+_NO_CORRECTION, _INVALID = int(Rejection.NO_CORRECTION), int(Rejection.CORRECTION_INVALID)
+_AGE, _B_VALUES, _EPHEMERIS_IOD = (
+    int(Rejection.CORRECTION_AGE),
+    int(Rejection.B_VALUES),
+    int(Rejection.EPHEMERIS_IOD),
+)
+_CRC_MISSING, _CRC_MISMATCH = int(Rejection.EPHEMERIS_CRC_MISSING), int(Rejection.EPHEMERIS_CRC_MISMATCH)
+_NOT_SETTLED: Final = int(Rejection.NOT_SETTLED)
+
+
+@compiled
+def corrected_range_m(smoothed_m, prc_m, rrc_mps, age_s, satellite_clock_s):
+    """Corrected range without troposphere: P + PRC + RRC (t - t_z) + c dt_sv [m].
+
+    Source: ICAO Annex 10 vol. I, App. B 3.6.5.2.
+    """
+    return smoothed_m + prc_m + rrc_mps * age_s + SPEED_OF_LIGHT_MPS * satellite_clock_s
+
+
+@compiled
+def settling_factor(settled_s, tau_s):
+    """Noise left by a carrier smoothing filter over that of the settled 100 s filter of the sigma models [-].
+
+    Time since the filter's start and time constant [s].
+
+    Notes
+    -----
+    White code noise of variance v per second: the mean over t < tau leaves v/t; the settled filter v/(2 tau); between
+    them the start decays with exp(-2 (t - tau)/tau). The factor is the root of the ratio to v/(2 100 s), never below
+    one. For tau = 100 s it is 1.41 at t = tau and within 1 % of one after 2.96 tau.
+    """
+    if np.isnan(settled_s):
+        return np.nan
+    tau, since_start = max(tau_s, _YOUNGEST_S), max(settled_s, _YOUNGEST_S)
+    if since_start < tau:
+        variance = 1.0 / since_start
+    else:
+        variance = (1.0 + np.exp(-2.0 * (since_start - tau) / tau)) / (2.0 * tau)
+    return np.sqrt(max(variance * 2.0 * MODEL_TAU_S, 1.0))
+
+
+@compiled
+def is_valid(corrections, s):
+    """Whether a correction has all it needs."""
+    return np.isfinite(corrections[PRC, s] + corrections[RRC, s] + corrections[SIGMA, s])
+
+
+@compiled
+def receivers_behind(corrections, s):
+    """Number of reference receivers behind a correction, counted from its B values."""
+    count = 0
+    for row in range(B_VALUES, corrections.shape[0]):
+        count += np.isfinite(corrections[row, s])
+    return count
+
+
+@compiled
+def single_receiver(corrections, n_receivers):
+    """Whether all corrections are of one receiver: the station says so, and no valid one has B values."""
+    if n_receivers != 1:
+        return False
+    for s in range(corrections.shape[1]):
+        if receivers_behind(corrections, s) >= 2 and is_valid(corrections, s):
+            return False
+    return True
+
+
+@compiled
+def usable_b_values(corrections, single, s):
+    """Whether the B values of a satellite support a protection level.
+
+    A correction needs the B values of two receivers or more. Without any it is the correction of a single receiver:
+    that has a protection level only when the station says so (no number of receivers in its station data) and no other
+    correction has B values, so that the multiplier of one receiver holds for all.
+
+    Source: RTCA DO-253 (approach protection levels); the rule for stations of one receiver is ours.
+    """
+    count = receivers_behind(corrections, s)
+    return count >= 2 or (count == 0 and single)
+
+
+@compiled
+def first_reason(s, tracked, systems, corrections, fresh, single, own, own_crc, checks, settled):
+    """The first rule that rejects a satellite; NONE when none does. Written so that NaN rejects."""
+    if not tracked:
+        return _NOT_TRACKED
+    if not systems[s]:
+        return _SYSTEM
+    if not np.isfinite(corrections[LISTED, s]):
+        return _NO_CORRECTION
+    if not is_valid(corrections, s):
+        return _INVALID
+    if not fresh:
+        return _AGE
+    if not usable_b_values(corrections, single, s):
+        return _B_VALUES
+    if not np.isfinite(own[_OWN_IOD, s]):
+        return _EPHEMERIS_IOD
+    iod, crc, p = checks[0, s], checks[1, s], checks[2, s]
+    if not (iod == corrections[IOD, s] and np.isfinite(crc + p)):
+        return _CRC_MISSING
+    if own_crc[s] != crc:
+        return _CRC_MISMATCH
+    return _NONE if settled else _NOT_SETTLED
+
+
+@compiled
+def correct_ranges(
+    measured, tau_s, product, corrections, age_s, own, own_crc, checks, systems, gps_week, tow_s, n_receivers,
+    timeout_s, settle_s, inflate,
+):  # fmt: skip
+    """Reasons ``(M, N)``, corrected ranges and factors on airborne noise ``(M, N)``, satellite positions ``(M, 3, N)``.
+
+    Parameters
+    ----------
+    measured : (M, 3, N) array
+        Raw and smoothed code [m], age of the filter [s].
+    tau_s, product : (M,) arrays
+        Time constant [s]; which of the P sets of corrections.
+    corrections, age_s : (P, rows, N), (P,) arrays
+        Sets of corrections and their ages [s].
+    own, own_crc : (P, fields, N), (P, N) arrays
+        Own ephemerides with the issue of data of the corrections, and their CRCs.
+    checks : (3, N) array
+        Issue of data, CRC and P as the station sent them.
+    systems : (N,) bool array
+    """
+    n_modes, _, n_sats = measured.shape
+    reason = np.empty((n_modes, n_sats), np.int64)
+    ranges_m, factor = np.full((n_modes, n_sats), np.nan), np.ones((n_modes, n_sats))
+    place_m = np.full((n_modes, 3, n_sats), np.nan)
+    for m in range(n_modes):
+        p = product[m]
+        single, fresh = single_receiver(corrections[p], n_receivers), -timeout_s <= age_s[p] <= timeout_s
+        for s in range(n_sats):
+            code_m, smoothed_m, since_s = measured[m, 0, s], measured[m, 1, s], measured[m, 2, s]
+            reason[m, s] = first_reason(
+                s, np.isfinite(smoothed_m), systems, corrections[p], fresh, single, own[p], own_crc[p], checks,
+                since_s >= settle_s,
+            )  # fmt: skip
+            if inflate:
+                factor[m, s] = settling_factor(since_s, tau_s[m])
+            if np.isfinite(code_m + own[p, _OWN_IOD, s]):
+                x, y, z, clock_s = transmit_place(own[p], s, gps_week, tow_s, code_m, L1)
+                place_m[m, 0, s], place_m[m, 1, s], place_m[m, 2, s] = x, y, z
+                ranges_m[m, s] = corrected_range_m(
+                    smoothed_m, corrections[p, PRC, s], corrections[p, RRC, s], age_s[p], clock_s
+                )
+    return reason, ranges_m, factor, place_m
