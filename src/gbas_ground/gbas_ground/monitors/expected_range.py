@@ -9,7 +9,8 @@ import numpy as np
 from gbas_core.parameters import Parameter, parameters
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import CLOCK_GROUPS
-from gbas_ground.monitors.result import MonitorResult, upper_limit
+from gbas_ground.monitors.kernels.ranges import expected_ranges
+from gbas_ground.monitors.result import MonitorResult
 
 
 @parameters
@@ -45,16 +46,5 @@ def check_expected_range(raw_correction_m: FloatArray, tracked: BoolArray, limit
     With one satellite of a constellation the residual is zero and with two a fault shows on both: the smallest common
     set of the corrections is larger than that.
     """
-    own = np.where(tracked & CLOCK_GROUPS[:, np.newaxis], raw_correction_m, np.nan)  # (k, R, N)
-    by_group = own - row_median(own)
-    residual = np.where(CLOCK_GROUPS[0], by_group[0], by_group[1])
-    return upper_limit(np.abs(residual), limit_m, tracked)
-
-
-def row_median(values: FloatArray) -> FloatArray:
-    """Median of the finite values of each row, as a column; NaN for a row without any."""
-    ordered = np.sort(values, axis=-1)  # NaN last
-    count = np.isfinite(values).sum(axis=-1, keepdims=True)
-    low, high = np.maximum(count - 1, 0) // 2, count // 2
-    pair = np.take_along_axis(ordered, np.concatenate([low, high], axis=-1), axis=-1)
-    return np.asarray(0.5 * (pair[..., :1] + pair[..., 1:]))
+    size, failed = expected_ranges(np.ascontiguousarray(raw_correction_m), tracked, CLOCK_GROUPS, float(limit_m))
+    return MonitorResult(statistic=size, threshold=np.asarray(limit_m, dtype=np.float64), failed=failed)
