@@ -58,7 +58,7 @@ def _monitors_s(n_epochs: int) -> float:
     for number, epoch in enumerate(epochs):
         dt_s = _T_S if number else float("nan")
         begin_s = time.process_time()
-        single, _ = ccd_step(single, epoch.code_m, epoch.carrier_m, epoch.restarted, epoch.used, dt_s, single_params)
+        single, _ = ccd_step(single, epoch, dt_s, single_params)
         double, seen = two_frequency_step(double, epoch, dt_s, double_params)
         classify(seen.mean_mps[[0, 1, 3]], seen.covariance, L1, L5)
         taken.append(time.process_time() - begin_s)

@@ -36,7 +36,8 @@ from gbas_ground.monitors.double_difference import baselines_of
 from gbas_ground.monitors.ephemeris_residual import EphemerisResidualParams
 from gbas_ground.monitors.expected_power import PowerExpectationParams
 from gbas_ground.monitors.expected_range import ExpectedRangeParams
-from gbas_ground.monitors.ionosphere_gradient import IonosphereGradientParams, gradient_site
+from gbas_ground.monitors.gradient_coverage import gradient_site
+from gbas_ground.monitors.ionosphere_gradient import IonosphereGradientParams
 from gbas_ground.monitors.registry import SIGNAL_MONITORS
 from gbas_ground.monitors.sigma_monitor import SigmaMonitorParams
 from gbas_ground.monitors.signal_power import SignalPowerParams

@@ -22,7 +22,8 @@ from gbas_ground.monitors.ccd_f import TwoFrequencyParams
 from gbas_ground.monitors.double_difference import DoubleDifferences, Troposphere
 from gbas_ground.monitors.ephemeris_residual import EphemerisResidualParams
 from gbas_ground.monitors.expected_power import PowerExpectationParams
-from gbas_ground.monitors.ionosphere_gradient import GradientSite, IonosphereGradientParams, gradient_site
+from gbas_ground.monitors.gradient_coverage import GradientSite, gradient_site
+from gbas_ground.monitors.ionosphere_gradient import IonosphereGradientParams
 from gbas_ground.monitors.shared_receiver import Planes, planes_of
 from gbas_ground.params import GroundParams
 from gbas_vdb.messages.types import FasDataSet, Type2

@@ -11,8 +11,9 @@ from gbas_core.parameters import ParameterError
 from gbas_ground.claims.gradient_claim import coverage_by_elevation, gradient_claim
 from gbas_ground.claims.limits import MAX_M_EIG, MAX_Y_EIG_M
 from gbas_ground.monitors.carrier_noise import CarrierNoise
+from gbas_ground.monitors.gradient_coverage import gradient_site
 from gbas_ground.monitors.gradient_detectability import BaselineMonitor, coverage_percent
-from gbas_ground.monitors.ionosphere_gradient import IonosphereGradientParams, gradient_site
+from gbas_ground.monitors.ionosphere_gradient import IonosphereGradientParams
 from monitor_scenes import BRAUNSCHWEIG_M, RUNWAY_RAD, braunschweig_station, station_of
 
 QUIET = {"carrier_noise": {"floor_m": [0.0004] * 3, "low_m": [0.003] * 3}}  # antennas that limit multipath

@@ -7,7 +7,7 @@ import pytest
 
 from gbas_core.ranging.divergence import DivergenceParams, ramp_response
 from gbas_core.signals import L1, L2, L5, N_BANDS
-from gbas_ground.monitors.ccd import CcdParams, ccd_step, initial_ccd
+from gbas_ground.monitors.ccd import CcdInput, CcdParams, ccd_step, initial_ccd
 
 N = 68
 T_S = 0.5
@@ -27,7 +27,7 @@ def run(code_rate_mps, *, params=QUICK, receivers=3, epochs=400, used=None, chan
         slips = np.zeros(shape, dtype=bool)
         change(number, code, carrier)
         dt_s = T_S if number else float("nan")
-        state, epoch = ccd_step(state, code, carrier, slips, used, dt_s, params)
+        state, epoch = ccd_step(state, CcdInput(code, carrier, slips, used), dt_s, params)
     return epoch
 
 

@@ -21,6 +21,7 @@ from gbas_ground.monitors.double_difference import (
     reference_satellites,
 )
 from gbas_ground.monitors.false_alarm import false_alarm_multiplier
+from gbas_ground.monitors.gradient_coverage import blind_gradients, coverage_at, gradient_site
 from gbas_ground.monitors.gradient_detectability import (
     BaselineMonitor,
     blind_intervals,
@@ -28,13 +29,7 @@ from gbas_ground.monitors.gradient_detectability import (
     double_difference_sigma_m,
 )
 from gbas_ground.monitors.gradient_estimates import gradient_set
-from gbas_ground.monitors.ionosphere_gradient import (
-    IonosphereGradientParams,
-    blind_gradients,
-    check_ionosphere_gradient,
-    coverage_at,
-    gradient_site,
-)
+from gbas_ground.monitors.ionosphere_gradient import IonosphereGradientParams, check_ionosphere_gradient
 from gbas_ground.params import GroundParams
 from gbas_sim.atmosphere.fronts import WedgeFront
 from gbas_sim.atmosphere.troposphere import Troposphere as SimulatedTroposphere
@@ -478,8 +473,9 @@ def test_tests_that_are_run_are_those_that_coverage_is_of():
     made = double_differences(residual, site.baselines, references, low, PARAMS.noise, PARAMS.bands)
     result = check_ionosphere_gradient(made, HERE, site, PARAMS)
     looked = np.isfinite(result.by_baseline.statistic).any(axis=0)
-    assert not (looked & ~result.tested).any()
-    number = result.tested.sum(axis=0)
+    tested = site.masks[result.chosen].T
+    assert not (looked & ~tested).any()
+    number = tested.sum(axis=0)
     assert set(number[HERE].tolist()) == {1, 2}  # both happen
     for satellite in np.flatnonzero(looked.any(axis=0)):
         k = false_alarm_multiplier(PARAMS.p_false_alarm, tests=int(number[satellite]))
@@ -487,13 +483,11 @@ def test_tests_that_are_run_are_those_that_coverage_is_of():
         np.testing.assert_allclose(result.by_baseline.threshold[0, :, satellite], limit, rtol=1e-12)
         own = IonosphereGradientParams(
             runway_bearing_rad=(RUNWAY_RAD,),
-            carriers=tuple(np.array(PARAMS.carriers)[result.tested[:, satellite]].tolist()),
+            carriers=tuple(np.array(PARAMS.carriers)[tested[:, satellite]].tolist()),
         )
         monitors = [
             BaselineMonitor(length_m=abs(float(site.length_m[0, 0])), sigma_m=float(sigma), band=band)
-            for sigma, band in zip(
-                made.nominal_sigma_m[0, result.tested[:, satellite], satellite], own.bands, strict=True
-            )
+            for sigma, band in zip(made.nominal_sigma_m[0, tested[:, satellite], satellite], own.bands, strict=True)
             if k * sigma < 0.5 * WAVELENGTH_M[band]
         ]
         exact = coverage_percent(monitors, k + site.k_md) / 100.0

@@ -20,8 +20,12 @@ from gbas_ground.monitors.ephemeris_residual import (
     initial_ephemeris_residual,
     site_decorrelation,
 )
-from gbas_ground.monitors.expected_power import initial_power_expectation, power_expectation_step
-from gbas_ground.monitors.ionosphere_gradient import check_ionosphere_gradient, gradient_site
+from gbas_ground.monitors.expected_power import (
+    initial_power_expectation,
+    power_expectation_step,
+)
+from gbas_ground.monitors.gradient_coverage import gradient_site
+from gbas_ground.monitors.ionosphere_gradient import check_ionosphere_gradient
 from gbas_sim.atmosphere.fronts import WedgeFront
 from gbas_sim.atmosphere.troposphere import Troposphere as SimulatedTroposphere
 from gbas_sim.faults.kinds import ExcessiveAcceleration, LowPower, OrbitFault

@@ -34,7 +34,8 @@ from gbas_core.record import FloatArray
 from gbas_ground.claims.limits import MAX_M_EIG, MAX_Y_EIG_M
 from gbas_ground.monitors.double_difference import NO_REFERENCE, DoubleDifferences
 from gbas_ground.monitors.ephemeris_residual import REFERENCE_ELEVATION_RAD
-from gbas_ground.monitors.ionosphere_gradient import GradientSite, IonosphereGradientParams, check_ionosphere_gradient
+from gbas_ground.monitors.gradient_coverage import GradientSite
+from gbas_ground.monitors.ionosphere_gradient import IonosphereGradientParams, check_ionosphere_gradient
 
 APPROACH_SPEED_MPS: Final = 70.0
 """Of the aircraft behind the 2.75 m of E_IG. Known."""

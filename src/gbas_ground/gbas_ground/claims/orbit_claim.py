@@ -40,6 +40,7 @@ from gbas_ground.claims.limits import MAX_DECORRELATION
 from gbas_ground.monitors.carrier_noise import CarrierNoise
 from gbas_ground.monitors.double_difference import Baselines, DoubleDifferences
 from gbas_ground.monitors.ephemeris_residual import EphemerisResidualParams, assumed_sigma_m, site_decorrelation
+from gbas_ground.monitors.kernels import gradient as kernels
 
 DECORRELATION_STEP: Final = 5.0e-6
 """Step of it in the messages [m/m]."""
@@ -122,21 +123,17 @@ def orbit_bound(differences: DoubleDifferences, elevation_rad: FloatArray, site:
     reckoned with, P grows by the worst baseline's ratio.
     """
     bound = np.full(elevation_rad.shape, np.inf)
-    count = len(site.baselines)
-    if count < 2:
+    if len(site.baselines) < 2:
         return bound
-    seen = np.isfinite(differences.residual_m[:, 0])
-    there = np.flatnonzero(np.logical_or.reduce(seen))
-    if not there.size:
-        return bound
-    seen, elevation_rad = seen.take(there, axis=1), elevation_rad.take(there)
-    sigma = np.fmax(differences.sigma_m[:, 0], differences.nominal_sigma_m[:, 0]).take(there, axis=1)
-    ratio = sigma / assumed_sigma_m(site.baselines, elevation_rad, site.noise, site.monitor)
-    excess = np.maximum.reduce(np.where(seen, ratio, 1.0), initial=1.0)
-    code = (1 << np.arange(count)) @ seen
-    for each in set(code.tolist()):
-        here = np.flatnonzero(code == each)
-        bound[there[here]] = excess[here] * supported_decorrelation(site, elevation_rad[here], seen[:, here[0]])
+    code = kernels.seen(differences.residual_m, 1)
+    assumed_m = assumed_sigma_m(site.baselines, elevation_rad, site.noise, site.monitor)
+    excess = kernels.noise_excess(
+        differences.residual_m, differences.sigma_m, differences.nominal_sigma_m, np.ascontiguousarray(assumed_m)
+    )
+    rows = np.arange(len(site.baselines))
+    for each in set(code.tolist()) - {0}:
+        supported = supported_decorrelation(site, elevation_rad, (each >> rows & 1) > 0)
+        bound = np.where(code == each, excess * supported, bound)
     return bound
 
 

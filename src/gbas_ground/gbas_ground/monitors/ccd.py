@@ -10,28 +10,27 @@ Source: Jiang, Milner, Macabiau, ENC 2015, eq (1) to (4) and 2.1.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Final
+from functools import cached_property
+from typing import TYPE_CHECKING, Annotated, Final, NamedTuple, Protocol
 
 import numpy as np
 
 from gbas_core.parameters import Derived, Parameter, parameters
-from gbas_core.ranging.combinations import code_minus_carrier
 from gbas_core.ranging.divergence import (
     GROUND,
     GROUND_SIGMA_MPS,
     GROUND_THRESHOLD_MPS,
     DivergenceParams,
     DivergenceState,
-    divergence_step,
     initial_divergence,
-    settled,
 )
 from gbas_core.record import BoolArray, FloatArray
-from gbas_core.satellites import missing
+from gbas_core.satellites import N_SATS, missing
 from gbas_core.signals import L1, N_BANDS
 from gbas_ground.monitors.false_alarm import exposure_probability, least_correlation
 from gbas_ground.monitors.interface import MonitoredEpoch, MonitorOutput, SignalMonitor, verdicts
-from gbas_ground.monitors.monitor_table import row_of, summarise
+from gbas_ground.monitors.kernels import ccd as kernels
+from gbas_ground.monitors.monitor_table import summarise
 from gbas_ground.monitors.result import MonitorResult, upper_limit
 from gbas_msgs_py.monitors import CCD
 from gbas_msgs_py.records import MAX_REFERENCE_RECEIVERS
@@ -69,6 +68,11 @@ class CcdParams:
     ] = GROUND_SIGMA_MPS  # fmt: skip
     filters: Annotated[DivergenceParams, Derived("of tau_s, settle_s and the longest gap of the smoothing")] = GROUND
 
+    @cached_property
+    def limit_mps(self) -> FloatArray:
+        """The threshold for every satellite, ``(N_BANDS, N)`` [m/s]."""
+        return np.full((N_BANDS, N_SATS), self.threshold_mps)
+
     def p_false_exclusion(self) -> float:
         """Of one source in 15 s: 9.1e-8 for the published threshold and sigma, as of 17 independent samples."""
         return exposure_probability(self.threshold_mps / self.sigma_mps, least_correlation(self.tau_s))
@@ -88,8 +92,6 @@ class CcdEpoch:
         Mean over the settled channels in use; NaN where there is none [m/s].
     receivers : (N_BANDS, N) array
         How many there are.
-    channels : MonitorResult
-        ``(R, N_BANDS, N)``: size of each settled channel's rate, in use or not, against the same threshold.
     satellites : MonitorResult
         ``(N_BANDS, N)``: size of the mean against the threshold. Where `receivers` is 0 it says nothing, and the
         satellite is not monitored on that band.
@@ -99,8 +101,12 @@ class CcdEpoch:
     settled: BoolArray
     mean_mps: FloatArray
     receivers: FloatArray
-    channels: MonitorResult
     satellites: MonitorResult
+
+    @property
+    def channels(self) -> MonitorResult:
+        """Size of each settled channel's rate, in use or not, against the same threshold, ``(R, N_BANDS, N)``."""
+        return upper_limit(np.abs(self.receiver_mps), self.satellites.threshold, self.settled)
 
 
 def initial_ccd(params: CcdParams, n_receivers: int) -> DivergenceState:
@@ -108,14 +114,40 @@ def initial_ccd(params: CcdParams, n_receivers: int) -> DivergenceState:
     return initial_divergence(params.filters, n_receivers, N_BANDS)
 
 
+class Channels(Protocol):
+    """What the monitor looks at; missing is NaN.
+
+    Attributes
+    ----------
+    code_m, carrier_m : (R, N_BANDS, N) arrays
+        Raw code and carrier ranges [m].
+    restarted : (R, N_BANDS, N) bool array
+        Cycle slips, code jumps and restarts of the smoothing filter.
+    used : (R, N) bool array
+        Receivers averaged for each satellite.
+    """
+
+    @property
+    def code_m(self) -> FloatArray: ...
+    @property
+    def carrier_m(self) -> FloatArray: ...
+    @property
+    def restarted(self) -> BoolArray: ...
+    @property
+    def used(self) -> BoolArray: ...
+
+
+class CcdInput(NamedTuple):
+    """:class:`Channels` of one epoch."""
+
+    code_m: FloatArray
+    carrier_m: FloatArray
+    restarted: BoolArray
+    used: BoolArray
+
+
 def ccd_step(
-    state: DivergenceState,
-    code_m: FloatArray,
-    carrier_m: FloatArray,
-    restarted: BoolArray,
-    used: BoolArray,
-    dt_s: float,
-    params: CcdParams,
+    state: DivergenceState, seen: Channels, dt_s: float, params: CcdParams
 ) -> tuple[DivergenceState, CcdEpoch]:
     """Monitor one epoch.
 
@@ -123,36 +155,36 @@ def ccd_step(
     ----------
     state : DivergenceState
         From :func:`initial_ccd` or the previous step.
-    code_m, carrier_m : (R, N_BANDS, N) arrays
-        Raw code and carrier ranges [m].
-    restarted : (R, N_BANDS, N) bool array
-        Cycle slips, code jumps and restarts of the smoothing filter.
-    used : (R, N) bool array
-        Receivers averaged for each satellite.
+    seen : Channels
     dt_s : float
         Time since the epoch before, NaN at the first [s].
     params : CcdParams
     """
-    state, _, filtered = divergence_step(state, code_minus_carrier(code_m, carrier_m), restarted, dt_s, params.filters)
-    counts = settled(state, params.filters)
-    averaged = counts & used[:, np.newaxis]
-    mean, receivers = receiver_mean(filtered, averaged)
-    epoch = CcdEpoch(
+    filters, limit = params.filters, params.limit_mps
+    *memory, filtered, settled = kernels.filtered_rates(
+        state.value_m,
+        state.f1_mps,
+        state.f2_mps,
+        state.since_s,
+        state.age_s,
+        seen.code_m,
+        seen.carrier_m,
+        seen.restarted,
+        float(dt_s),
+        float(filters.tau_s),
+        float(filters.max_gap_s),
+        float(filters.settle_s),
+    )
+    mean, receivers, size, failed = kernels.tested(filtered, settled, seen.used, float(params.threshold_mps))
+    value_m, f1_mps, f2_mps, since_s, age_s = memory
+    new = DivergenceState(value_m=value_m, f1_mps=f1_mps, f2_mps=f2_mps, since_s=since_s, age_s=age_s)
+    return new, CcdEpoch(
         receiver_mps=filtered,
-        settled=counts,
+        settled=settled,
         mean_mps=mean,
         receivers=receivers,
-        channels=upper_limit(np.abs(filtered), params.threshold_mps, counts),
-        satellites=upper_limit(np.abs(mean), params.threshold_mps, receivers > 0),
+        satellites=MonitorResult(statistic=size, threshold=limit, failed=failed),
     )
-    return state, epoch
-
-
-def receiver_mean(values: FloatArray, averaged: BoolArray) -> tuple[FloatArray, FloatArray]:
-    """Mean over the first axis of what is `averaged`, and how many that are; NaN where there are none."""
-    count = averaged.sum(axis=0)
-    total = np.where(averaged, values, 0.0).sum(axis=0)
-    return np.where(count > 0, total / np.maximum(count, 1), np.nan), count
 
 
 # --- in the station
@@ -166,8 +198,12 @@ def _step(state: DivergenceState, epoch: MonitoredEpoch) -> tuple[DivergenceStat
     """Corrections are on L1: its rates count."""
     inputs = epoch.inputs
     params = inputs.station.ccd
-    state, found = ccd_step(state, inputs.code_m, inputs.carrier_m, inputs.slipped, inputs.ready, inputs.dt_s, params)
-    result = row_of(found.satellites, L1)
+    seen = CcdInput(inputs.code_m, inputs.carrier_m, inputs.slipped, inputs.ready)
+    state, found = ccd_step(state, seen, inputs.dt_s, params)
+    of_bands = found.satellites
+    result = MonitorResult(
+        statistic=of_bands.statistic[L1], threshold=of_bands.threshold[L1], failed=of_bands.failed[L1]
+    )
     by_receiver = missing(MAX_REFERENCE_RECEIVERS)
     by_receiver[: len(found.receiver_mps)] = found.receiver_mps[:, L1]
     test = CCD.test("rate")

@@ -15,12 +15,8 @@ A divergence like the ionosphere's, (1, gamma, -1, -gamma) on codes and carriers
 
 The receiver clock of a satellite is the mean over the *other* satellites of its constellation. Filters are linear, so
 it is removed in two steps: the mean of all before the filters, and what the others have left of it behind them, which
-comes to the same. A fault as large as d would appear on n others as -d/n, and pass the threshold there first if their
-sigma is smaller. Behind the filters a satellite under suspicion is therefore taken out of the others' clock, together
-with all it has done to it. When a satellite fails, suspicion falls on all whose carrier rate is beyond half the
-threshold from the median of both constellations, whose clocks run alike; then on the largest carrier rate of its
-constellation, and on the next, where that halves what is above the threshold. Where suspicion leaves too few satellites
-of a constellation, the clock is that of both.
+comes to the same. There a satellite under suspicion is taken out of the others' clock, together with all it has done to
+it (:mod:`~.divergence_suspects`).
 
 A channel that misses epochs bridges the gap with the mean accumulated meanwhile.
 
@@ -37,20 +33,11 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 import numpy as np
 
 from gbas_core.parameters import Derived, Parameter, ParameterError, parameters
-from gbas_core.ranging.combinations import divergence_free_cmc, ionosphere_free
-from gbas_core.ranging.divergence import (
-    GROUND,
-    DivergenceParams,
-    DivergenceState,
-    divergence_step,
-    initial_divergence,
-    rate_step,
-    settled,
-)
-from gbas_core.record import BoolArray, FloatArray
-from gbas_core.satellites import CLOCK_GROUPS, N_SATS, missing
-from gbas_core.signals import BAND_INDEX, L1, L5, SPEED_OF_LIGHT_MPS
-from gbas_ground.monitors.ccd import receiver_mean
+from gbas_core.ranging.combinations import iono_free_weights, iono_ratio
+from gbas_core.ranging.divergence import GROUND, DivergenceParams
+from gbas_core.record import BoolArray, FloatArray, IntArray
+from gbas_core.satellites import N_SATS, missing
+from gbas_core.signals import BAND_INDEX, L1, L5
 from gbas_ground.monitors.divergence_classification import MODES, NO_FAULT, classify
 from gbas_ground.monitors.divergence_covariance import (
     StatisticCovariance,
@@ -58,34 +45,21 @@ from gbas_ground.monitors.divergence_covariance import (
     matrix_of,
     triangle,
 )
-from gbas_ground.monitors.divergence_forms import (
-    DEGREES_OF_FREEDOM,
-    Form,
-    full_rank_form,
-    published_form,
-    threshold,
-    with_iono_free_code,
-)
-from gbas_ground.monitors.expected_range import row_median
+from gbas_ground.monitors.divergence_forms import DEGREES_OF_FREEDOM, PRINTED_INVERSE, Form, threshold
+from gbas_ground.monitors.divergence_suspects import Judge, TwoFrequencyEpoch, without_suspects
 from gbas_ground.monitors.false_alarm import exposure_probability, least_correlation
 from gbas_ground.monitors.interface import MonitoredEpoch, MonitorOutput, SignalMonitor, Verdict, verdicts
+from gbas_ground.monitors.kernels import ccd_f as kernels
+from gbas_ground.monitors.kernels.divergence_filter import AGE, N_MEMORY, VALUE
 from gbas_ground.monitors.monitor_table import summarise
-from gbas_ground.monitors.result import MonitorResult, upper_limit
 from gbas_msgs_py.codes import Signal
 from gbas_msgs_py.monitors import CCD_F
 
 if TYPE_CHECKING:
     from gbas_ground.prepared import PreparedStation
 
-# Known: obliquity 1 / sqrt(0.002 + sin^2 E). Source: ICAO Annex 10 Vol. I, App. B 3.6.5.3.
-_OBLIQUITY: Final = 0.002
-# Uncertain, ours: more satellites at once are no satellites' faults, and all of them fail.
-_MOST_SUSPECTS: Final = 4
-# Uncertain, ours: of the threshold; a satellite that is in no clock costs little, a faulty one that is in them much.
-_SUSPICION: Final = 0.5
 LARGEST_ZENITH_DELAY_M: Final = 5.0
 """Air has 2.2 to 2.8 m."""
-_ALL: Final = np.ones((1, N_SATS), dtype=bool)
 
 
 @parameters
@@ -135,6 +109,33 @@ class TwoFrequencyParams:
             if len(getattr(self, name)) != len(self.elevation_rad):
                 raise ParameterError(f"{name} = {getattr(self, name)} is not one number a node of elevation_deg")
         _ = self.covariance  # what is none is refused here
+
+    @cached_property
+    def bands(self) -> IntArray:
+        """Both bands."""
+        return np.array([self.band, self.other])
+
+    @cached_property
+    def weights(self) -> FloatArray:
+        """Gains of the divergence-free combinations of both bands, and coefficients of the ionosphere-free one."""
+        a, b = self.band, self.other
+        gains = [2.0 / (iono_ratio(*pair) - 1.0) for pair in ((a, b), (b, a))]
+        return np.array([*gains, *iono_free_weights(a, b)])
+
+    @cached_property
+    def limits(self) -> FloatArray:
+        """Thresholds of the published form and of that of full rank."""
+        return np.array([threshold(form, self.p_false_alarm) for form in ("published", "full_rank")])
+
+    @cached_property
+    def thresholds(self) -> FloatArray:
+        """The same for every satellite, ``(2, N)``."""
+        return np.repeat(self.limits[:, np.newaxis], N_SATS, axis=1)
+
+    @cached_property
+    def published_inverse(self) -> FloatArray:
+        """Of the published covariance; it is for L1 and L5 alone, and so singular only with their ratio."""
+        return PRINTED_INVERSE if (self.band, self.other) == (L1, L5) else np.full((4, 4), np.nan)
 
     @property
     def band(self) -> int:
@@ -217,10 +218,9 @@ class TwoFrequencyState:
 
     Attributes
     ----------
-    codes : DivergenceState
-        ``(2, R, N)``: DF of both bands.
-    carrier : DivergenceState
-        ``(R, N)``: filters of the compensated IF carrier's rate, less the mean of all.
+    filters : (3, 5, R, N) array
+        Memory of the filters (:mod:`~.kernels.divergence_filter`) of DF of both bands, and of the compensated IF
+        carrier's rate, less the mean of all.
     residual_m : (R, N) array
         Last IF carrier less geometry, satellite clock and troposphere [m].
     clock_m : (R, N) array
@@ -231,53 +231,20 @@ class TwoFrequencyState:
         Of the last epoch.
     """
 
-    codes: DivergenceState
-    carrier: DivergenceState
+    filters: FloatArray
     residual_m: FloatArray
     clock_m: FloatArray
     since_s: FloatArray
     rebased: BoolArray
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class TwoFrequencyEpoch:
-    """Result of one epoch.
-
-    Attributes
-    ----------
-    receiver_mps : (3, R, N) array
-        Filtered DF, DF of the other band and IF carrier of each channel; the carrier only where enough other channels
-        have settled to give the clock [m/s].
-    settled : (R, N) bool array
-        Where all three count.
-    mean_mps : (4, N) array
-        Means over the settled receivers in use, with IF code minus carrier in the paper's third place [m/s].
-    receivers : (N,) array
-        How many those are; 0: the satellite is not monitored.
-    clock_satellites : (N,) array
-        Fewest satellites behind the clock of a receiver averaged.
-    covariance : (N, 3, 3) array
-        Of the full-rank form's means [(m/s)^2].
-    published, full_rank : MonitorResult
-        ``(N,)``: quadratic form against its threshold [-].
-    """
-
-    receiver_mps: FloatArray
-    settled: BoolArray
-    mean_mps: FloatArray
-    receivers: FloatArray
-    clock_satellites: FloatArray
-    covariance: FloatArray
-    published: MonitorResult
-    full_rank: MonitorResult
-
-
 def initial_two_frequency(params: TwoFrequencyParams, n_receivers: int) -> TwoFrequencyState:
     """State of a monitor that has seen nothing."""
     shape = (n_receivers, N_SATS)
+    filters = np.zeros((3, N_MEMORY, *shape))
+    filters[:, [VALUE, AGE]] = np.nan
     return TwoFrequencyState(
-        codes=initial_divergence(params.filters, 2, n_receivers),
-        carrier=initial_divergence(params.filters, n_receivers),
+        filters=filters,
         residual_m=np.full(shape, np.nan),
         clock_m=np.zeros(shape),
         since_s=np.zeros(shape),
@@ -299,173 +266,33 @@ def two_frequency_step(
         Time since the epoch before, NaN at the first [s].
     params : TwoFrequencyParams
     """
-    restarted = epoch.restarted[:, params.band] | epoch.restarted[:, params.other]
-    codes, _, code_rates = divergence_step(
-        state.codes, _divergence_free(epoch, params), restarted, dt_s, params.filters
+    filters = params.filters
+    memory, residual_m, clock_m, since_s, rates, settled = kernels.advanced(
+        state.filters,
+        state.residual_m,
+        state.clock_m,
+        state.since_s,
+        state.rebased,
+        epoch.code_m,
+        epoch.carrier_m,
+        epoch.restarted,
+        epoch.range_m,
+        epoch.clock_s,
+        epoch.rebased,
+        epoch.elevation_rad,
+        epoch.clock_used,
+        params.bands,
+        params.weights,
+        float(dt_s),
+        float(filters.tau_s),
+        float(filters.max_gap_s),
+        float(filters.settle_s),
+        float(params.zenith_delay_m),
     )
-    new, carrier_rate = _carrier(state, epoch, restarted, dt_s, params)
-    counts = settled(codes, params.filters).all(axis=0) & settled(new.carrier, params.filters)
-    suspect = np.zeros(N_SATS, dtype=bool)
-    result = _judged(code_rates, carrier_rate, counts, suspect, epoch, params)
-    in_clock = np.logical_or.reduce(epoch.clock_used, axis=0)  # what is in no clock disturbs none
-    if (result.full_rank.failed & in_clock).any():
-        apart = _apart(result, carrier_rate, counts, epoch, params)
-        if apart.any():
-            without = _judged(code_rates, carrier_rate, counts, apart, epoch, params)
-            if _explains(without, result, ~apart, 1.0):
-                suspect, result = apart, without
-    for group in CLOCK_GROUPS & in_clock:
-        for _ in range(_MOST_SUSPECTS):
-            if not (result.full_rank.failed & group & ~suspect).any():
-                break
-            more = suspect | _most_deviant(result, group & ~suspect)
-            without = _judged(code_rates, carrier_rate, counts, more, epoch, params)
-            if not _explains(without, result, group & ~more, 0.5):
-                break
-            suspect, result = more, without
-    return replace(new, codes=codes), result
-
-
-def _apart(
-    result: TwoFrequencyEpoch, rate_mps: FloatArray, counts: BoolArray, epoch: TwoFrequencyInput,
-    params: TwoFrequencyParams,
-) -> BoolArray:  # fmt: skip
-    """Satellites in the clocks whose carrier rate is far from the median, which a minority does not move, ``(N,)``."""
-    rate = np.where(counts & epoch.clock_used, rate_mps, np.nan)
-    deviation = rate - row_median(rate)
-    there = np.isfinite(deviation)
-    mean = np.where(there, deviation, 0.0).sum(axis=0) / np.maximum(there.sum(axis=0), 1)
-    variance = result.covariance[:, 2, 2]
-    return np.asarray(mean**2 > _SUSPICION**2 * threshold("full_rank", params.p_false_alarm) * variance)
-
-
-def _explains(without: TwoFrequencyEpoch, result: TwoFrequencyEpoch, rest: BoolArray, share: float) -> bool:
-    """Whether it was the clock: all that failed can be judged, and of what the rest had too much a share is left."""
-    judged = np.isfinite(without.full_rank.statistic[result.full_rank.failed]).all()
-    return bool(judged and _excess(without, rest) <= share * _excess(result, rest))
-
-
-def _most_deviant(result: TwoFrequencyEpoch, candidates: BoolArray) -> BoolArray:
-    """The monitored candidate with the largest carrier rate, as a mask."""
-    size = np.where(candidates & (result.receivers > 0), np.abs(result.mean_mps[3]), -1.0)
-    found: BoolArray = (np.arange(N_SATS) == size.argmax()) & (size >= 0.0)
-    return found
-
-
-def _excess(result: TwoFrequencyEpoch, satellites: BoolArray) -> float:
-    """Sum of the failed metrics of some satellites."""
-    return float(result.full_rank.statistic[result.full_rank.failed & satellites].sum())
-
-
-def _judged(
-    code_rates: FloatArray,
-    carrier_rate: FloatArray,
-    counts: BoolArray,
-    suspect: BoolArray,
-    epoch: TwoFrequencyInput,
-    params: TwoFrequencyParams,
-) -> TwoFrequencyEpoch:
-    """Statistics and verdicts with receiver clocks that do without the satellites under suspicion."""
-    member, fewest = counts & epoch.clock_used & ~suspect, params.min_clock_satellites
-    clock, others = _others_mean(carrier_rate, member, fewest)
-    if suspect.any():
-        both, of_both = _others_mean(carrier_rate, member, fewest, groups=_ALL)
-        few = others < fewest
-        clock, others = np.where(few, both, clock), np.where(few, of_both, others)
-    receiver = np.concatenate([code_rates, (carrier_rate - clock)[np.newaxis]])
-    counts = counts & np.isfinite(clock)
-    averaged = counts & epoch.used
-    rates, count = receiver_mean(receiver.swapaxes(0, 1), averaged[:, np.newaxis])
-    receivers = count[0]
-    n_clock = np.where(averaged, others, np.inf).min(axis=0)
-    covariance = params.covariance.at(epoch.elevation_rad, receivers, n_clock)
-    means = with_iono_free_code(rates, params.band, params.other)
-    return TwoFrequencyEpoch(
-        receiver_mps=receiver,
-        settled=counts,
-        mean_mps=means,
-        receivers=receivers,
-        clock_satellites=np.where(receivers > 0, n_clock, np.nan),
-        covariance=covariance,
-        published=_published(means, receivers, params),
-        full_rank=upper_limit(
-            full_rank_form(rates, covariance), threshold("full_rank", params.p_false_alarm), receivers > 0
-        ),
-    )
-
-
-def _published(means_mps: FloatArray, receivers: FloatArray, params: TwoFrequencyParams) -> MonitorResult:
-    """The paper's form, for L1 and L5 alone: its covariance is of these, and so singular only with their ratio."""
-    applies = (receivers > 0) & ((params.band, params.other) == (L1, L5))
-    statistic = np.where(applies, published_form(means_mps, receivers), np.nan)
-    return upper_limit(statistic, threshold("published", params.p_false_alarm), applies)
-
-
-def _divergence_free(epoch: TwoFrequencyInput, params: TwoFrequencyParams) -> FloatArray:
-    """Divergence-free code minus carrier of both bands, (2, R, N) [m]."""
-    code, carrier = epoch.code_m, epoch.carrier_m
-    a, b = params.band, params.other
-    return np.stack(
-        [
-            divergence_free_cmc(code[:, a], carrier[:, a], carrier[:, b], a, b),
-            divergence_free_cmc(code[:, b], carrier[:, b], carrier[:, a], b, a),
-        ]
-    )
-
-
-def _carrier(
-    state: TwoFrequencyState, epoch: TwoFrequencyInput, restarted: BoolArray, dt_s: float, params: TwoFrequencyParams
-) -> tuple[TwoFrequencyState, FloatArray]:
-    """Filtered rate of the compensated IF carrier less the mean of all, ``(R, N)``."""
-    a, b = params.band, params.other
-    iono_free = ionosphere_free(epoch.carrier_m[:, a], epoch.carrier_m[:, b], a, b)
-    troposphere = params.zenith_delay_m / np.sqrt(_OBLIQUITY + np.sin(epoch.elevation_rad) ** 2)
-    residual = iono_free - epoch.range_m + SPEED_OF_LIGHT_MPS * epoch.clock_s - troposphere
-    since_s = state.since_s + (dt_s if dt_s > 0.0 else np.inf)
-    alive = np.isfinite(state.residual_m) & ~restarted & (since_s <= params.filters.max_gap_s)
-    present = np.isfinite(residual)
-    change = np.where(alive & present & ~epoch.rebased, residual - state.residual_m, np.nan)
-    # Channels measured at the last epoch, too: what they have in common is the clock of this one interval.
-    together = np.isfinite(change) & (state.since_s == 0.0)
-    accumulated = state.clock_m + _mean_of_all(change, together & epoch.clock_used)
-    rate = (change - accumulated) / since_s
-    # The one epoch at which the expected range jumps tells nothing: the filter goes on with the rate it has.
-    coasting = epoch.rebased & ~state.rebased & alive & present
-    rate = np.where(coasting, state.carrier.f1_mps, rate)
-    carrier, filtered = rate_step(state.carrier, rate, since_s, restarted, dt_s, params.filters)
     new = TwoFrequencyState(
-        codes=state.codes,
-        carrier=carrier,
-        residual_m=np.where(present, residual, np.where(alive, state.residual_m, np.nan)),
-        clock_m=np.where(present, 0.0, accumulated),
-        since_s=np.where(present, 0.0, since_s),
-        rebased=epoch.rebased,
+        filters=memory, residual_m=residual_m, clock_m=clock_m, since_s=since_s, rebased=epoch.rebased
     )
-    return new, filtered
-
-
-def _mean_of_all(values: FloatArray, member: BoolArray) -> FloatArray:
-    """Mean over the members of each receiver ``(R, 1)``; NaN where there are none."""
-    count = member.sum(axis=-1, keepdims=True)
-    total = np.where(member, values, 0.0).sum(axis=-1, keepdims=True)
-    return np.asarray(np.where(count > 0, total / np.maximum(count, 1), np.nan))
-
-
-def _others_mean(
-    values: FloatArray, member: BoolArray, fewest: int, *, groups: BoolArray = CLOCK_GROUPS
-) -> tuple[FloatArray, FloatArray]:
-    """Mean over the other members of the same group, and how many they are, ``(R, N)``; NaN below `fewest`.
-
-    Source: ENC 2015, eq (13), with i for the first j.
-    """
-    own = np.where(member, values, 0.0)
-    total, count = np.zeros_like(own), np.zeros_like(own)
-    for group in groups:
-        total += np.where(group, (own * group).sum(axis=-1, keepdims=True), 0.0)
-        count += np.where(group, (member & group).sum(axis=-1, keepdims=True), 0)
-    others = count - member
-    mean = (total - own) / np.maximum(others, 1.0)
-    return np.where(others >= fewest, mean, np.nan), others
+    return new, without_suspects(Judge(rates_mps=rates, settled=settled, epoch=epoch, params=params))
 
 
 # --- in the station

@@ -11,14 +11,17 @@ from typing import Final
 import numpy as np
 
 from gbas_core.record import BoolArray
+from gbas_core.satellites import N_SATS
 from gbas_core.signals import L1
 from gbas_ground.monitors.interface import MonitoredEpoch, MonitorOutput, SignalMonitor, Verdict, no_memory
+from gbas_ground.monitors.kernels.ranges import common_slips
 from gbas_ground.monitors.monitor_table import summarise
-from gbas_ground.monitors.result import MonitorResult, upper_limit
+from gbas_ground.monitors.result import MonitorResult
 from gbas_msgs_py.monitors import COMMON_SLIP
 
 _MOST_SHARE = 0.5
 """When more of the tracked satellites slip at once, it is not the satellites. Ours."""
+_ONE: Final = np.ones(N_SATS)
 
 
 def check_common_slip(slipped: BoolArray, tracked: BoolArray, due: BoolArray) -> MonitorResult:
@@ -41,10 +44,8 @@ def check_common_slip(slipped: BoolArray, tracked: BoolArray, due: BoolArray) ->
     Source: ours; slips of receivers are independent, but for interference and scintillation, which end the use of the
     satellite in any case.
     """
-    number = (slipped & tracked).sum(axis=0).astype(np.float64)
-    several = number > 1.0
-    most = several.sum() > _MOST_SHARE * max(1, int(tracked.any(axis=0).sum()))
-    return upper_limit(number, 1.0, due & (not most))
+    number, failed = common_slips(slipped, tracked, due, _MOST_SHARE)
+    return MonitorResult(statistic=number, threshold=_ONE, failed=failed)
 
 
 # --- in the station
@@ -54,7 +55,7 @@ def _step(state: None, epoch: MonitoredEpoch) -> tuple[None, MonitorOutput]:
     """A satellite that steps has no settled filters any more, so `due` does not have it."""
     inputs = epoch.inputs
     tracked = np.isfinite(inputs.code_m[:, L1] + inputs.carrier_m[:, L1])
-    result = check_common_slip(inputs.slipped[:, L1], tracked, inputs.in_use)
+    result = check_common_slip(np.ascontiguousarray(inputs.slipped[:, L1]), tracked, inputs.in_use)
     test = COMMON_SLIP.test("slips")
     return state, MonitorOutput(
         summaries={COMMON_SLIP.key(test.name): summarise(result, inputs.in_use)},

@@ -10,6 +10,7 @@ Source: Jiang, Milner, Macabiau, ENC 2015, eq (16) and (18).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import Final
 
@@ -20,6 +21,7 @@ from scipy.special import chdtri
 from gbas_core.ranging.combinations import combination_matrix
 from gbas_core.ranging.divergence import white_noise_gain
 from gbas_core.record import FloatArray
+from gbas_ground.monitors.kernels.ccd_f import covariances
 
 Matrix3 = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
 Triple = tuple[float, float, float]
@@ -155,16 +157,15 @@ class StatisticCovariance:
         (N, 3, 3) array
             [(m/s)^2].
         """
-        averaged = np.array(self.receiver) / np.maximum(receivers, 1)[:, np.newaxis, np.newaxis]
-        covariance = averaged + np.array(self.common)
-        scale = np.ones((len(elevation_rad), 3))
-        if self.factor:
-            table = np.array(self.factor)
-            scale = np.stack([np.interp(elevation_rad, self.elevation_rad, column) for column in table.T], axis=-1)
-        scale = np.where(np.isfinite(elevation_rad)[:, np.newaxis], scale, np.nan)
-        covariance = covariance * scale[:, :, np.newaxis] * scale[:, np.newaxis, :]
-        covariance[:, 2, 2] *= 1.0 + 1.0 / np.maximum(clock_satellites, 1.0)
-        return np.asarray(covariance)
+        given = (np.array(each, dtype=np.float64) for each in (elevation_rad, receivers, clock_satellites))
+        found: FloatArray = covariances(*given, *self.tables)
+        return found
+
+    @cached_property
+    def tables(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Both parts ``(3, 3)``, nodes ``(K,)`` and factors ``(K, 3)``."""
+        factor = np.array(self.factor, dtype=np.float64).reshape(-1, 3)
+        return np.array(self.receiver), np.array(self.common), np.array(self.elevation_rad, dtype=np.float64), factor
 
 
 def published_by_origin() -> StatisticCovariance:

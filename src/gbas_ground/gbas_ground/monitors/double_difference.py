@@ -29,16 +29,14 @@ import numpy as np
 
 from gbas_core.gnss.frames import geodetic_from_ecef, rot_enu_ecef
 from gbas_core.record import BoolArray, FloatArray, IntArray
-from gbas_core.satellites import CLOCK_GROUPS, N_SATS
-from gbas_core.signals import SPEED_OF_LIGHT_MPS, WAVELENGTH_M
+from gbas_core.satellites import CLOCK_GROUPS
+from gbas_core.signals import WAVELENGTH_M
 from gbas_ground.monitors.carrier_noise import CarrierNoise
-from gbas_ground.monitors.gradient_detectability import Fuse, wrap_m
+from gbas_ground.monitors.kernels import double_difference as kernels
 
 Pairing = Literal["star", "all"]
 
 NO_REFERENCE: Final = -1
-_EARTH_RADIUS_M: Final = 6_371_000.0
-_DISTANCE_M: Final = 23.0e6  # of a satellite; its part is small
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -93,7 +91,7 @@ def baselines_of(positions_m: FloatArray, reference_m: FloatArray, pairing: Pair
     enu = (np.asarray(positions_m) - reference_m) @ rot_enu_ecef(latitude, longitude).T
     count = len(enu)
     pairs = [(i, j) for i in range(count) for j in range(i + 1, count) if pairing == "all" or i == 0]
-    first, second = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
+    first, second = np.ascontiguousarray(np.array(pairs, dtype=np.int64).reshape(-1, 2).T)
     return Baselines(first=first, second=second, vector_m=enu[second] - enu[first], place_m=enu)
 
 
@@ -134,14 +132,15 @@ class Troposphere:
         higher, mostly because its vertical is another, and at 8 degrees the delay is 15 mm less. Two metres of height
         make 4 mm there.
 
-        Source: ICAO Annex 10 Vol. I, App. B 3.6.5.3, the delay whose difference between two heights is TC.
+        Source: :func:`~gbas_ground.monitors.kernels.double_difference.slant_delays_m`.
         """
-        towards = place_m[:, :1] * np.sin(azimuth_rad) + place_m[:, 1:2] * np.cos(azimuth_rad)
-        sine = np.sin(elevation_rad)
-        higher = towards * (1.0 / _EARTH_RADIUS_M + sine / _DISTANCE_M)
-        sine = sine + np.cos(elevation_rad) * higher
-        zenith = self.refractivity * 1e-6 * self.scale_height_m * np.exp(-place_m[:, 2:] / self.scale_height_m)
-        return np.asarray(zenith / np.sqrt(0.002 + sine**2))
+        return kernels.slant_delays_m(
+            np.array(elevation_rad, dtype=np.float64),
+            np.array(azimuth_rad, dtype=np.float64),
+            place_m,
+            float(self.refractivity),
+            float(self.scale_height_m),
+        )
 
 
 def carrier_residual_m(
@@ -169,8 +168,8 @@ def carrier_residual_m(
     (R, F, N) array
         Receiver clock, ambiguity and minus the ionosphere [m].
     """
-    expected = range_m - SPEED_OF_LIGHT_MPS * clock_s + delay_m
-    return carrier_m[:, list(bands)] - expected[:, np.newaxis, :]
+    given = (np.ascontiguousarray(each) for each in (carrier_m, range_m, clock_s, delay_m))
+    return kernels.residuals_m(*given, np.array(bands))
 
 
 def reference_satellites(may_refer: BoolArray, elevation_rad: FloatArray, count: int) -> IntArray:
@@ -184,12 +183,7 @@ def reference_satellites(may_refer: BoolArray, elevation_rad: FloatArray, count:
     count : int
         Most reference satellites of one constellation.
     """
-    result = np.full((N_SATS, count), NO_REFERENCE)
-    for group in CLOCK_GROUPS:
-        here = np.flatnonzero(may_refer & group & np.isfinite(elevation_rad))
-        highest = here[np.argsort(-elevation_rad[here], kind="stable")[:count]]
-        result[group, : len(highest)] = highest
-    return result
+    return kernels.highest(may_refer, elevation_rad, CLOCK_GROUPS, count)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -242,82 +236,14 @@ def double_differences(
     satellites share is found on both, and nobody else is blamed; in general with (P - 1) / 2. Fewer references than
     that, and it is the others that fail. A satellite with a single reference shares its verdict.
     """
-    shape = (len(baselines), len(bands), N_SATS)
-    single = residual_m[baselines.second] - residual_m[baselines.first]
-    factors = noise.factors(len(residual_m))
-    scale = np.hypot(factors[baselines.first], factors[baselines.second])
-    variance = (scale[:, np.newaxis, np.newaxis] * noise.sigma_m(elevation_rad, bands)) ** 2
-    here = np.flatnonzero(np.isfinite(single).any(axis=(0, 1)))
-    result = DoubleDifferences(
-        residual_m=np.full(shape, np.nan),
-        sigma_m=np.full(shape, np.nan),
-        nominal_sigma_m=np.full(shape, np.nan),
-        reference=np.full(shape, NO_REFERENCE),
+    factors, sigma_m = noise.factors(len(residual_m)), noise.sigma_m(elevation_rad, bands)
+    left_m, sigma_m, nominal_m, reference = kernels.middle(
+        np.ascontiguousarray(residual_m),
+        baselines.first,
+        baselines.second,
+        factors,
+        sigma_m,
+        references,
+        WAVELENGTH_M.take(bands),
     )
-    if here.size and len(baselines):
-        found = _middle(single, variance, references, here, WAVELENGTH_M[list(bands)])
-        for name, value in zip(("residual_m", "sigma_m", "nominal_sigma_m", "reference"), found, strict=True):
-            getattr(result, name)[..., here] = value
-    return result
-
-
-def _middle(
-    single_m: FloatArray, variance_m2: FloatArray, references: IntArray, here: IntArray, wavelength_m: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray, IntArray]:
-    """Residual, sigma, nominal sigma and reference of the middle statistic of the satellites `here`."""
-    others = references[here]  # (n, P)
-    valid = (others != NO_REFERENCE) & (others != here[:, np.newaxis])
-    difference = single_m.take(here, axis=-1)[..., np.newaxis] - single_m.take(others, axis=-1)  # (B, F, n, P)
-    wrapped = np.where(valid, wrap_m(difference, wavelength_m[:, np.newaxis, np.newaxis]), np.nan)
-    variance = variance_m2.take(here, axis=-1)[..., np.newaxis] + variance_m2.take(others, axis=-1)
-    there = np.isfinite(wrapped)
-    number = there.sum(axis=-1)
-    rank = np.maximum(number - 1, 0) // 2
-    each = np.arange(number.size).reshape(number.shape) * others.shape[-1]
-    order = np.argsort(wrapped**2 / variance, axis=-1).ravel()  # NaN last
-    middle = order[each + rank] + each
-    # Without noise a gradient is the larger against its sigma the smaller that is: the middle one from above.
-    ordered = np.sort(np.where(there, variance, np.nan), axis=-1).ravel()
-    nominal = np.sqrt(ordered[each + np.maximum(number - 1 - rank, 0)])
-    known = number > 0
-    chosen = np.broadcast_to(others, wrapped.shape).reshape(-1)[middle]
-    return (
-        wrapped.ravel()[middle],
-        np.where(known, np.sqrt(variance.ravel()[middle]), np.nan),
-        nominal,
-        np.where(known, chosen, NO_REFERENCE),
-    )
-
-
-def decided(statistic: FloatArray, threshold: FloatArray, fuse: Fuse = "any") -> tuple[FloatArray, FloatArray]:
-    """Statistic and threshold of the baseline and band that decide about each satellite.
-
-    Parameters
-    ----------
-    statistic, threshold : (B, F, N) arrays
-        NaN where there is none.
-    fuse : {"any", "all"}
-        The worst of all; or the worst of the bands' best baselines, so that all of a band have to fail.
-
-    Returns
-    -------
-    (N,) arrays
-        NaN for a satellite without a statistic.
-    """
-    n_sats = statistic.shape[-1]
-    if statistic.size == 0:  # a single receiver
-        return np.full(n_sats, np.nan), np.full(n_sats, np.nan)
-    place, each = _deciding(statistic / threshold, fuse), np.arange(n_sats)
-    return statistic.reshape(-1, n_sats)[place, each], threshold.reshape(-1, n_sats)[place, each]
-
-
-def _deciding(ratio: FloatArray, fuse: Fuse) -> IntArray:
-    """Baseline and band (N,), flattened, that decide: the worst, or the worst of the bands' best; NaN is none."""
-    n_bands, n_sats = ratio.shape[1:]
-    if fuse == "any":
-        flat = ratio.reshape(-1, n_sats)
-        return np.asarray(np.argmax(np.where(np.isnan(flat), -1.0, flat), axis=0))
-    best = np.argmin(np.where(np.isnan(ratio), np.inf, ratio), axis=0)  # (F, N)
-    least = np.take_along_axis(ratio, best[np.newaxis], axis=0)[0]
-    band = np.argmax(np.where(np.isnan(least), -1.0, least), axis=0)
-    return np.asarray(best[band, np.arange(n_sats)] * n_bands + band)
+    return DoubleDifferences(residual_m=left_m, sigma_m=sigma_m, nominal_sigma_m=nominal_m, reference=reference)

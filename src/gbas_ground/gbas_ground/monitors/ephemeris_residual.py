@@ -38,11 +38,12 @@ from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import N_SATS
 from gbas_core.signals import L1, L5, N_BANDS, WAVELENGTH_M
 from gbas_ground.monitors.carrier_noise import CarrierNoise
-from gbas_ground.monitors.double_difference import Baselines, DoubleDifferences, decided
+from gbas_ground.monitors.double_difference import Baselines, DoubleDifferences
 from gbas_ground.monitors.false_alarm import FALSE_EXCLUSION, false_alarm_multiplier
 from gbas_ground.monitors.interface import MonitoredEpoch, MonitorOutput, SignalMonitor, verdicts
+from gbas_ground.monitors.kernels import double_difference as kernels
 from gbas_ground.monitors.monitor_table import signal_of, summarise
-from gbas_ground.monitors.result import MonitorResult, upper_limit
+from gbas_ground.monitors.result import MonitorResult
 from gbas_msgs_py.monitors import EPHEMERIS_RESIDUAL
 
 if TYPE_CHECKING:
@@ -153,19 +154,22 @@ def ephemeris_residual_step(
     result : MonitorResult
         ``(N,)``: size of the double difference of the baseline and band that is worst, and its threshold [m].
     """
-    wavelength = WAVELENGTH_M[list(params.bands)][:, np.newaxis]
-    residual, there = differences.residual_m, np.isfinite(differences.residual_m)
-    elapsed = state.unseen_s + dt_s
-    goes_on = (elapsed > 0.0) & (elapsed <= params.max_gap_s)
-    before = state.followed_m
-    if shift_m is not None:
-        before = before + (shift_m[baselines.second] - shift_m[baselines.first])[:, np.newaxis]
-    followed = residual + np.where(goes_on, wavelength * np.rint((before - residual) / wavelength), 0.0)
-    threshold = params.multiplier(len(baselines)) * differences.sigma_m
-    statistic, limit = decided(np.abs(followed), threshold)
-    new = EphemerisResidualState(followed_m=np.where(there, followed, before), unseen_s=np.where(there, 0.0, elapsed))
-    applies = due & np.isfinite(statistic)
-    return new, upper_limit(statistic, limit, applies)
+    followed_m, unseen_s, statistic, limit, failed = kernels.followed(
+        state.followed_m,
+        state.unseen_s,
+        differences.residual_m,
+        differences.sigma_m,
+        baselines.first,
+        baselines.second,
+        np.zeros((len(baselines.place_m), N_SATS)) if shift_m is None else shift_m,
+        due,
+        float(dt_s),
+        float(params.max_gap_s),
+        params.multiplier(len(baselines)),
+        WAVELENGTH_M.take(params.bands),
+    )
+    new = EphemerisResidualState(followed_m=followed_m, unseen_s=unseen_s)
+    return new, MonitorResult(statistic=statistic, threshold=limit, failed=failed)
 
 
 def decorrelation(

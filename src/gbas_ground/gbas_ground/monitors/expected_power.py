@@ -14,7 +14,8 @@ numbers ours).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Final
 
 import numpy as np
@@ -26,8 +27,9 @@ from gbas_core.satellites import N_SATS
 from gbas_core.signals import L1, L5, N_BANDS
 from gbas_ground.monitors.false_alarm import EPOCH_S, FALSE_EXCLUSION, false_alarm_multiplier
 from gbas_ground.monitors.interface import MonitoredEpoch, MonitorOutput, SignalMonitor, Verdict, verdicts
+from gbas_ground.monitors.kernels import power as kernels
 from gbas_ground.monitors.monitor_table import moved, signal_of, summarise, worst_of
-from gbas_ground.monitors.result import MonitorResult, upper_limit
+from gbas_ground.monitors.result import MonitorResult
 from gbas_msgs_py.monitors import EXPECTED_POWER
 
 if TYPE_CHECKING:
@@ -90,6 +92,12 @@ class PowerExpectationParams:
     def minimum_dbhz(self) -> tuple[tuple[float, ...], ...]:
         """Minimum at the nodes, one row for each of the bands L1, L2, L5 [dB-Hz]."""
         return (self.minimum_l1_dbhz, self.minimum_l2_dbhz, self.minimum_l5_dbhz)
+
+    @cached_property
+    def table(self) -> tuple[FloatArray, FloatArray]:
+        """Nodes ``(K,)`` [rad] and minimum of the bands tested ``(F, K)`` [dB-Hz]."""
+        values = [self.minimum_dbhz[band] for band in self.bands]
+        return np.array(self.elevation_rad, dtype=np.float64), np.array(values, dtype=np.float64)
 
 
 def minimum_from_expectation(
@@ -195,80 +203,37 @@ def power_expectation_step(
         A channel that fails alone still has a part in the average: that its own power is low lowers the mean of four
         receivers by a quarter of it, and the table's margin has to pass that.
     """
-    value = cn0_dbhz[:, list(params.bands)]
-    there = np.isfinite(value)
-    elapsed = state.unseen_s + dt_s
-    goes_on = (elapsed > 0.0) & (elapsed <= params.max_gap_s)
-    weight = np.where(goes_on, np.minimum(elapsed / params.average_s, 1.0), 1.0)
-    before = np.where(goes_on, state.mean_dbhz, value)
-    mean = before + weight * (value - before)  # NaN where there is no value
-    minimum = np.array(
-        [np.interp(elevation_rad, params.elevation_rad, params.minimum_dbhz[band]) for band in params.bands]
+    bands, dt_s = np.array(params.bands), float(dt_s)
+    now, mean, unseen = kernels.averaged(
+        state.mean_dbhz, state.unseen_s, cn0_dbhz, bands, dt_s, float(params.average_s), float(params.max_gap_s)
     )
-    wanted = due[:, np.newaxis] & (there | (np.arange(len(params.bands)) == 0)[:, np.newaxis])
-    result = _compared(mean, minimum, wanted, elevation_rad, state, params)
-    learnt_dbhz, learnt_s = state.learnt_dbhz, state.learnt_s
+    channels, channels_failed, wanted, satellites, satellites_failed = kernels.tested(
+        now,
+        cn0_dbhz,
+        bands,
+        due,
+        elevation_rad,
+        *params.table,
+        float(params.channel_margin_db),
+        bool(params.learn),
+        float(params.drop_db),
+        float(params.learnt_after_s),
+        state.learnt_dbhz,
+        state.learnt_s,
+        BIN_RAD,
+    )
+    learnt = (state.learnt_dbhz, state.learnt_s)
     if params.learn and 0.0 < dt_s <= params.max_gap_s:
-        taught = wanted & there & ~result.channels.failed & ~result.satellites.failed
-        learnt_dbhz, learnt_s = _taught(state, value, taught, elevation_rad, dt_s, params)
-    new = PowerExpectationState(
-        mean_dbhz=np.where(there, mean, state.mean_dbhz),
-        unseen_s=np.where(there, 0.0, elapsed),
-        learnt_dbhz=learnt_dbhz,
-        learnt_s=learnt_s,
+        failed = (channels_failed, satellites_failed)
+        learnt = kernels.taught(
+            *learnt, cn0_dbhz, bands, wanted, *failed, elevation_rad, dt_s, float(params.learn_s), BIN_RAD
+        )
+    return PowerExpectationState(
+        mean_dbhz=mean, unseen_s=unseen, learnt_dbhz=learnt[0], learnt_s=learnt[1]
+    ), PowerExpectationResult(
+        channels=MonitorResult(statistic=channels[0], threshold=channels[1], failed=channels_failed),
+        satellites=MonitorResult(statistic=satellites[0], threshold=satellites[1], failed=satellites_failed),
     )
-    return new, result
-
-
-def _compared(
-    mean_dbhz: FloatArray,
-    minimum_dbhz: FloatArray,
-    wanted: BoolArray,
-    elevation_rad: FloatArray,
-    state: PowerExpectationState,
-    params: PowerExpectationParams,
-) -> PowerExpectationResult:
-    taken = wanted & np.isfinite(mean_dbhz)
-    count = np.maximum(taken.sum(axis=0), 1)
-    average = np.where(taken.any(axis=0), np.where(taken, mean_dbhz, 0.0).sum(axis=0) / count, np.nan)
-    least = minimum_dbhz
-    if params.learn:
-        bins = _bins(elevation_rad)
-        known = state.learnt_s[..., bins] >= params.learnt_after_s
-        # the mean of what these very receivers see; without one of them known, the table alone
-        expected = np.where(taken, state.learnt_dbhz[..., bins], 0.0).sum(axis=0) / count
-        learnt = np.where((known | ~taken).all(axis=0), expected - params.drop_db, -np.inf)
-        least = np.maximum(least, learnt)
-    return PowerExpectationResult(
-        channels=upper_limit(-mean_dbhz, -(minimum_dbhz - params.channel_margin_db), wanted),
-        satellites=upper_limit(-average, -least, np.asarray(wanted.any(axis=0))),
-    )
-
-
-def _bins(elevation_rad: FloatArray) -> FloatArray:
-    inside = np.where(np.isfinite(elevation_rad), elevation_rad, 0.0) / BIN_RAD
-    return np.asarray(np.clip(inside.astype(np.int64), 0, N_BINS - 1))
-
-
-def _taught(
-    state: PowerExpectationState,
-    value_dbhz: FloatArray,
-    taught: BoolArray,
-    elevation_rad: FloatArray,
-    dt_s: float,
-    params: PowerExpectationParams,
-) -> tuple[FloatArray, FloatArray]:
-    """What is known after this epoch: a mean at first, an exponential one later."""
-    shape = state.learnt_s.shape
-    row = np.arange(shape[0] * shape[1]).reshape(shape[:2])[..., np.newaxis] * N_BINS
-    place = (row + _bins(elevation_rad))[taught]
-    size = state.learnt_s.size
-    number = np.bincount(place, minlength=size).reshape(shape)
-    total = np.bincount(place, weights=value_dbhz[taught], minlength=size).reshape(shape)
-    learnt_s = state.learnt_s + np.where(number > 0, dt_s, 0.0)
-    weight = np.where(number > 0, np.maximum(dt_s / np.maximum(learnt_s, dt_s), dt_s / params.learn_s), 0.0)
-    mean = total / np.maximum(number, 1)
-    return state.learnt_dbhz + weight * (mean - state.learnt_dbhz), learnt_s
 
 
 # --- in the station
@@ -286,13 +251,12 @@ def _step(state: PowerExpectationState, epoch: MonitoredEpoch) -> tuple[PowerExp
     state, found = power_expectation_step(
         state, inputs.cn0_dbhz, due, inputs.predicted.elevation_rad, inputs.dt_s, params
     )
-    worst = worst_of(found.satellites, axes=1)
-    satellites = replace(worst, failed=np.logical_or.reduce(found.satellites.failed))
+    summary = summarise(found.satellites, np.logical_or.reduce(due), signal_of(params.bands))
+    satellites = MonitorResult(statistic=summary.statistic, threshold=summary.threshold, failed=summary.failed)
     test = EXPECTED_POWER.test("satellite")
     channels: tuple[Verdict, ...] = ()
     if params.exclude and found.channels.failed.any():
         channels = (Verdict(test.cause, worst_of(moved(found.channels, 1, 0), axes=1)),)
-    summary = summarise(satellites, np.logical_or.reduce(due), signal_of(params.bands))
     return state, MonitorOutput(
         summaries={EXPECTED_POWER.key(test.name): summary},
         satellites=verdicts(params.exclude, test.cause, satellites, inputs.due),

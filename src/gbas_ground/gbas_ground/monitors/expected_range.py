@@ -3,17 +3,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Final
+from typing import Annotated
 
 import numpy as np
 
-from gbas_core.compiled import compiled
 from gbas_core.parameters import Parameter, parameters
-from gbas_core.record import BoolArray, FloatArray, IntArray
+from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import CLOCK_GROUPS
+from gbas_ground.monitors.kernels.ranges import expected_ranges
 from gbas_ground.monitors.result import MonitorResult
-
-_CONSTELLATION: Final[IntArray] = CLOCK_GROUPS.argmax(axis=0)
 
 
 @parameters
@@ -49,37 +47,5 @@ def check_expected_range(raw_correction_m: FloatArray, tracked: BoolArray, limit
     With one satellite of a constellation the residual is zero and with two a fault shows on both: the smallest common
     set of the corrections is larger than that.
     """
-    statistic, failed = _residuals_m(
-        np.ascontiguousarray(raw_correction_m), np.ascontiguousarray(tracked), _CONSTELLATION, float(limit_m)
-    )
-    return MonitorResult(statistic=statistic, threshold=np.array(float(limit_m)), failed=failed)
-
-
-@compiled
-def _residuals_m(raw_correction_m, tracked, constellation, limit_m):  # type: ignore[no-untyped-def]
-    """Sizes of the residuals, NaN where there is none, and where they fail: ``(R, N)``."""
-    n_receivers, n_sats = tracked.shape
-    residual_m, failed = np.full(tracked.shape, np.nan), tracked.copy()
-    values = np.empty(n_sats)
-    for r in range(n_receivers):
-        for group in range(constellation.max() + 1):
-            n = 0
-            for s in range(n_sats):
-                if tracked[r, s] and constellation[s] == group and np.isfinite(raw_correction_m[r, s]):
-                    values[n] = raw_correction_m[r, s]
-                    n += 1
-            clock_m = np.median(values[:n]) if n > 0 else np.nan
-            for s in range(n_sats):
-                if tracked[r, s] and constellation[s] == group:
-                    residual_m[r, s] = abs(raw_correction_m[r, s] - clock_m)
-                    failed[r, s] = not residual_m[r, s] <= limit_m
-    return residual_m, failed
-
-
-def row_median(values: FloatArray) -> FloatArray:
-    """Median of the finite values of each row, as a column; NaN for a row without any."""
-    ordered = np.sort(values, axis=-1)  # NaN last
-    count = np.isfinite(values).sum(axis=-1, keepdims=True)
-    low, high = np.maximum(count - 1, 0) // 2, count // 2
-    pair = np.take_along_axis(ordered, np.concatenate([low, high], axis=-1), axis=-1)
-    return np.asarray(0.5 * (pair[..., :1] + pair[..., 1:]))
+    size, failed = expected_ranges(np.ascontiguousarray(raw_correction_m), tracked, CLOCK_GROUPS, float(limit_m))
+    return MonitorResult(statistic=size, threshold=np.asarray(limit_m, dtype=np.float64), failed=failed)

@@ -35,6 +35,7 @@ from scipy.special import ndtri
 from gbas_core.parameters import ParameterError
 from gbas_core.record import FloatArray
 from gbas_core.signals import IONO_RATIO, L1, WAVELENGTH_M
+from gbas_ground.monitors.kernels.double_difference import wrapped
 
 Fuse = Literal["any", "all"]
 
@@ -154,8 +155,7 @@ def wrap_m(value_m: ArrayLike, wavelength_m: FloatArray | float) -> FloatArray:
 
     Source: Khanafseh, Yang, Pervan, ION GNSS 2010; the paper, eq (2).
     """
-    value = np.asarray(value_m, dtype=np.float64)
-    result: FloatArray = value - wavelength_m * np.rint(value / wavelength_m)
+    result: FloatArray = wrapped.py_func(np.asarray(value_m, dtype=np.float64), wavelength_m)  # type: ignore[attr-defined]
     return result
 
 

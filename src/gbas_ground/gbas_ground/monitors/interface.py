@@ -8,16 +8,16 @@ parameters, its memory before the first epoch, and its step. The station runs th
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
 from gbas_core.ranging.predicted_ranges import PredictedRanges
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import CLOCK_GROUPS
-from gbas_core.signals import N_BANDS
+from gbas_core.signals import BANDS
 from gbas_ground.monitors.double_difference import carrier_residual_m
 from gbas_ground.monitors.monitor_table import Summaries
 from gbas_ground.monitors.receiver_baselines import FittingDifferences, fitting_differences, quiet_receivers
@@ -27,6 +27,8 @@ from gbas_msgs_py.monitors import Monitor
 
 if TYPE_CHECKING:
     from gbas_ground.prepared import PreparedStation
+
+_ALL_BANDS: Final = tuple(range(len(BANDS)))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -83,8 +85,7 @@ class MonitorInputs:
         predicted, station = self.predicted, self.station
         place_m = station.gradient_site.baselines.place_m
         delay_m = station.troposphere.delay_m(predicted.elevation_rad, predicted.azimuth_rad, place_m)
-        bands = tuple(range(N_BANDS))
-        return carrier_residual_m(self.carrier_m, predicted.range_m, predicted.clock_s, delay_m, bands)
+        return carrier_residual_m(self.carrier_m, predicted.range_m, predicted.clock_s, delay_m, _ALL_BANDS)
 
 
 @dataclass(eq=False)
@@ -197,4 +198,7 @@ def verdicts(
     exclude: bool, cause: ExclusionCause, result: MonitorResult, due: BoolArray, power: int = 0
 ) -> tuple[Verdict, ...]:
     """The failures of satellites that are due, unless the monitor is only watched."""
-    return (Verdict(cause, replace(result, failed=result.failed & due), power),) if exclude else ()
+    if not exclude:
+        return ()
+    judged = MonitorResult(statistic=result.statistic, threshold=result.threshold, failed=result.failed & due)
+    return (Verdict(cause, judged, power),)

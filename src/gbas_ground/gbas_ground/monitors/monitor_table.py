@@ -94,9 +94,7 @@ def summarise(result: MonitorResult, due: BoolArray, signal: Signal = Signal.L1)
     return MonitorSummary(statistic, threshold, failed, expected, signal)
 
 
-def summarise_each(
-    result: MonitorResult, due: BoolArray, signal: Signal = Signal.L1
-) -> tuple[MonitorSummary, ...]:
+def summarise_each(result: MonitorResult, due: BoolArray, signal: Signal = Signal.L1) -> tuple[MonitorSummary, ...]:
     """The same of several tests, which are the first axis of the result; `due` is ``(N,)``."""
     worst = _worst_of_each(result, len(result.statistic))
     return tuple(MonitorSummary(*each, due, signal) for each in zip(*worst, strict=True))
@@ -104,12 +102,13 @@ def summarise_each(
 
 def _worst_of_each(result: MonitorResult, count: int) -> tuple[FloatArray, FloatArray, BoolArray]:
     """Statistic, threshold and verdict of the worst of each of so many tests, ``(count, N)``."""
-    shape = (count, -1, N_SATS)
-    given = result.threshold
-    threshold = given if given.shape == result.statistic.shape else np.broadcast_to(given, result.statistic.shape).copy()
-    statistic, failed = np.ascontiguousarray(result.statistic), np.ascontiguousarray(result.failed)
+    shape = result.statistic.shape
+    threshold = result.threshold
+    if threshold.shape != shape:
+        threshold = np.array(np.broadcast_to(threshold, shape))
+    parts = (result.statistic, threshold, result.failed)
     found: tuple[FloatArray, FloatArray, BoolArray] = worst_along(
-        statistic.reshape(shape), np.ascontiguousarray(threshold).reshape(shape), failed.reshape(shape)
+        *(np.ascontiguousarray(each).reshape(count, -1, N_SATS) for each in parts)
     )
     return found
 
@@ -167,9 +166,3 @@ def moved(result: MonitorResult, source: int, destination: int) -> MonitorResult
         threshold=np.moveaxis(np.broadcast_to(result.threshold, shape), source, destination),
         failed=np.moveaxis(np.broadcast_to(result.failed, shape), source, destination),
     )
-
-
-def row_of(result: MonitorResult, row: int) -> MonitorResult:
-    """One row of a result's first axis."""
-    threshold = np.broadcast_to(result.threshold, result.statistic.shape)
-    return MonitorResult(statistic=result.statistic[row], threshold=threshold[row], failed=result.failed[row])

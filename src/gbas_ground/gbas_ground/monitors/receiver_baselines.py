@@ -6,12 +6,14 @@ itself is named by them (:mod:`~gbas_ground.monitors.shared_receiver`), and then
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from gbas_core.record import BoolArray, FloatArray
 from gbas_ground.monitors.double_difference import DoubleDifferences, double_differences, reference_satellites
+from gbas_ground.monitors.kernels.double_difference import any_beyond
 from gbas_ground.monitors.result import MonitorResult
 from gbas_ground.monitors.shared_receiver import SharedReceiver, seen_quiet, shared_receiver
 
@@ -51,6 +53,8 @@ def fitting_differences(channels: BoolArray, inputs: MonitorInputs, station: Pre
 def quiet_receivers(channels: BoolArray, inputs: MonitorInputs, station: PreparedStation) -> FloatArray:
     """1 for receivers that would do on their baselines, 0 for those that would not, NaN where nobody can tell, (R,)."""
     quiet = np.ones(len(inputs.code_m))
+    if not inputs.suspended.any():
+        return quiet
     site = station.gradient_site
     for receiver in np.flatnonzero(inputs.suspended.any(axis=1)):
         again = channels.copy()
@@ -67,24 +71,20 @@ def _double_differences(channels: BoolArray, inputs: MonitorInputs, station: Pre
     """Of the channels given, over all baselines."""
     params, elevation_rad = station.ionosphere_gradient, inputs.predicted.elevation_rad
     references = reference_satellites(inputs.may_refer, elevation_rad, params.references)
-    used_m = np.where(channels[:, np.newaxis], inputs.residual_m[:, list(params.bands)], np.nan)
+    used_m = np.where(channels[:, np.newaxis], inputs.residual_m.take(params.bands, axis=1), np.nan)
     baselines = station.gradient_site.baselines
     return double_differences(used_m, baselines, references, elevation_rad, params.noise, params.bands)
 
 
 def _shared_receiver(differences: DoubleDifferences, inputs: MonitorInputs, station: PreparedStation) -> SharedReceiver:
-    threshold_m = station.gradient_site.k_ffd * differences.sigma_m
     least = station.params.monitors.receiver_fault_channels
-    due = inputs.due & (np.abs(differences.residual_m) > threshold_m).any(axis=(0, 1))
-    if not (due.any() and station.params.ionosphere_gradient.exclude):
-        count = len(inputs.code_m)
-        nobody = MonitorResult(
-            statistic=np.zeros(count), threshold=np.full(count, float(least)), failed=np.zeros(count, dtype=bool)
-        )
-        return SharedReceiver(receivers=nobody, most=False)
+    k_ffd = station.gradient_site.k_ffd
+    excludes = station.params.ionosphere_gradient.exclude
+    if not (excludes and any_beyond(differences.residual_m, differences.sigma_m, k_ffd, inputs.due)):
+        return _nobody(len(inputs.code_m), least)
     return shared_receiver(
         differences,
-        threshold_m,
+        k_ffd * differences.sigma_m,
         station.gradient_site.baselines,
         station.planes,
         inputs.due,
@@ -92,3 +92,11 @@ def _shared_receiver(differences: DoubleDifferences, inputs: MonitorInputs, stat
         inputs.predicted.azimuth_rad,
         least,
     )
+
+
+@lru_cache(maxsize=8)
+def _nobody(n_receivers: int, least: int) -> SharedReceiver:
+    """No satellite points to any receiver."""
+    number, needed = np.zeros(n_receivers), np.full(n_receivers, float(least))
+    failed = np.zeros(n_receivers, dtype=bool)
+    return SharedReceiver(receivers=MonitorResult(statistic=number, threshold=needed, failed=failed), most=False)

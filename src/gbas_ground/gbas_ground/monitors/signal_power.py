@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated
 
+import numpy as np
+
 from gbas_core.parameters import Parameter, parameters
 from gbas_core.record import BoolArray, FloatArray
-from gbas_ground.monitors.result import MonitorResult, upper_limit
+from gbas_ground.monitors.kernels.power import too_weak
+from gbas_ground.monitors.result import MonitorResult
 
 
 @parameters
@@ -37,5 +40,5 @@ def check_signal_power(
     MonitorResult
         Statistic: minus C/N0, so that larger is worse like everywhere [dB-Hz]; threshold: minus the minimum.
     """
-    applies = tracked if required else tracked & (cn0_dbhz == cn0_dbhz)
-    return upper_limit(-cn0_dbhz, -minimum_dbhz, applies)
+    statistic, failed = too_weak(np.ascontiguousarray(cn0_dbhz), tracked, float(minimum_dbhz), bool(required))
+    return MonitorResult(statistic=statistic, threshold=np.asarray(-minimum_dbhz, dtype=np.float64), failed=failed)

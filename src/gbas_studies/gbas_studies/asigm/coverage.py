@@ -25,15 +25,9 @@ from gbas_core.satellites import N_SATS
 from gbas_core.signals import BANDS, IONO_RATIO, WAVELENGTH_M
 from gbas_ground.monitors.double_difference import DoubleDifferences, double_differences, reference_satellites
 from gbas_ground.monitors.false_alarm import false_alarm_multiplier
+from gbas_ground.monitors.gradient_coverage import BandTests, GradientSite, blind_gradients, gradient_site
 from gbas_ground.monitors.gradient_detectability import P_FALSE_ALARM
-from gbas_ground.monitors.ionosphere_gradient import (
-    BandTests,
-    GradientSite,
-    IonosphereGradientParams,
-    blind_gradients,
-    check_ionosphere_gradient,
-    gradient_site,
-)
+from gbas_ground.monitors.ionosphere_gradient import IonosphereGradientParams, check_ionosphere_gradient
 from gbas_ground.params import GroundParams
 from gbas_sim.world import open_orbits
 from gbas_sim.world_params import WorldParams
@@ -88,7 +82,7 @@ def papers_multiplier(site: GradientSite) -> GradientSite:
     """The same station with the paper's k_ffd, 3.8906: 1e-4 of one baseline, band and epoch, whatever their number."""
     k_ffd = false_alarm_multiplier(P_FALSE_ALARM, interval_s=15.0)
     tests = tuple(BandTests(places=each.places, k_ffd=k_ffd) for each in site.tests)
-    return GradientSite(baselines=site.baselines, length_m=site.length_m, tests=tests, k_md=site.k_md)
+    return GradientSite(baselines=site.baselines, length_m=site.length_m, tests=tests, k_md=site.k_md, scale=site.scale)
 
 
 def elevations_of_a_day(station: GroundParams, world: WorldParams, step_s: float) -> FloatArray:

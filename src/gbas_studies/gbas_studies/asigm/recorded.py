@@ -27,11 +27,8 @@ from gbas_ground.monitors.double_difference import (
     double_differences,
     reference_satellites,
 )
-from gbas_ground.monitors.ionosphere_gradient import (
-    IonosphereGradientParams,
-    check_ionosphere_gradient,
-    gradient_site,
-)
+from gbas_ground.monitors.gradient_coverage import gradient_site
+from gbas_ground.monitors.ionosphere_gradient import IonosphereGradientParams, check_ionosphere_gradient
 from gbas_msgs_py.joining import ReceptionQueue
 from gbas_studies.ccd.recorded import MASK_RAD, PAIR_L1L2, PAIR_L1L5, RecordedSet, station_params
 from gbas_studies.reproduction.drawing import new_figure

@@ -120,7 +120,7 @@ def settled_base(world: World, n_following: int, *, covariance: StatisticCovaria
         if number >= SETTLE_EPOCHS:
             following.append(seen)
             continue
-        single, _ = ccd_step(single, seen.code_m, seen.carrier_m, seen.restarted, seen.used, dt_s, single_params)
+        single, _ = ccd_step(single, seen, dt_s, single_params)
         double, _ = two_frequency_step(double, seen, dt_s, params)
     return Base(single=single, double=double, following=tuple(following), params=params)
 
@@ -165,7 +165,7 @@ def inject(base: Base, mode: str, d_mps: float, satellite: int) -> Detection:
     for number, nominal in enumerate(base.following):
         since_s = number * T_S
         seen = _with_fault(nominal, fault, since_s, failed)
-        single, one = ccd_step(single, seen.code_m, seen.carrier_m, seen.restarted, seen.used, T_S, single_params)
+        single, one = ccd_step(single, seen, T_S, single_params)
         double, two = two_frequency_step(double, seen, T_S, base.params)
         said = {
             "gast-d L1": one.satellites.failed[L1, satellite], "gast-d L5": one.satellites.failed[L5, satellite],

@@ -318,7 +318,7 @@ class _Run:
         results = []
         for place, (single, double) in enumerate(self._params):
             before = self._states[place]
-            first, one = ccd_step(before[0], seen.code_m, seen.carrier_m, seen.restarted, seen.used, dt_s, single)
+            first, one = ccd_step(before[0], seen, dt_s, single)
             second, two = two_frequency_step(before[1], seen, dt_s, double)
             self._states[place] = (first, second)
             results.append((one, two))

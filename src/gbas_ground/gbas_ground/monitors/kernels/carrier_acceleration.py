@@ -206,7 +206,7 @@ def _worst_leaves(in_set, ratio):
 
 @compiled
 def _ratios(statistic, threshold, in_set, ratio):
-    """Largest statistic of each satellite over its threshold, NaN where one is missing; whether one of the set fails."""
+    """Largest statistic of each satellite over its threshold, NaN where one is missing; whether one of a set fails."""
     fails = False
     for sat in range(len(in_set)):
         ratio[sat] = 0.0
@@ -361,4 +361,3 @@ def concluded(known, due, terms, k):
                 satellites_failed[each, band, sat] = failed
                 failed_satellites[sat] |= failed
     return channels, channels_failed, satellites, satellites_failed, failed_channels, failed_satellites
-

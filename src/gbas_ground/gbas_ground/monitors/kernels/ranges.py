@@ -1,0 +1,50 @@
+# mypy: disable-error-code="no-untyped-call, no-untyped-def"
+"""Carriers that several receivers lose count of; raw ranges against the expected ones."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gbas_core.compiled import compiled
+from gbas_ground.monitors.kernels.median import median
+
+
+@compiled
+def common_slips(slipped, tracked, due, most_share):
+    """Receivers with a slip ``(N,)``, and the satellites that are due and slip at several, unless most do.
+
+    ``slipped``, ``tracked`` (R, N).
+    """
+    n_sats = len(due)
+    number, failed = np.zeros(n_sats), np.zeros(n_sats, dtype=np.bool_)
+    several, seen = 0, 0
+    for sat in range(n_sats):
+        any_tracked = False
+        for row in range(len(slipped)):
+            any_tracked = any_tracked or tracked[row, sat]
+            if slipped[row, sat] and tracked[row, sat]:
+                number[sat] += 1.0
+        several += 1 if number[sat] > 1.0 else 0
+        seen += 1 if any_tracked else 0
+    if several <= most_share * max(1, seen):
+        for sat in range(n_sats):
+            failed[sat] = due[sat] and number[sat] > 1.0
+    return number, failed
+
+
+@compiled
+def expected_ranges(raw_correction_m, tracked, groups, limit_m):
+    """Sizes of the residuals less the median of the receiver and constellation ``(R, N)``, and which are too large."""
+    size = np.full(raw_correction_m.shape, np.nan)
+    failed = np.zeros(raw_correction_m.shape, dtype=np.bool_)
+    own = np.empty(raw_correction_m.shape[1])
+    for row in range(raw_correction_m.shape[0]):
+        for group in range(len(groups)):
+            for sat in range(len(own)):
+                own[sat] = raw_correction_m[row, sat] if tracked[row, sat] and groups[group, sat] else np.nan
+            middle = median(own)
+            for sat in range(len(own)):
+                if groups[group, sat]:
+                    size[row, sat] = np.abs(own[sat] - middle)
+                    failed[row, sat] = tracked[row, sat] and not size[row, sat] <= limit_m
+    return size, failed
