@@ -1,0 +1,1 @@
+"""Loops over receivers, bands and satellites of the monitors."""
