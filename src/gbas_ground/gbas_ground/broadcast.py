@@ -17,8 +17,8 @@ from gbas_core.gnss.gpstime import epoch_key
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import IS_GALILEO, RANGING_SOURCE_ID
 from gbas_ground.claims.limits import MAX_DECORRELATION
+from gbas_ground.corrections.kernels.limits import MAX_B_VALUE_M
 from gbas_ground.corrections.sigma import MAX_SIGMA_M
-from gbas_ground.monitors.b_value import MAX_B_VALUE_M
 from gbas_ground.param_checks import MIN_SERVICE_SATELLITES
 from gbas_ground.params import GroundParams
 from gbas_ground.prepared import PreparedStation

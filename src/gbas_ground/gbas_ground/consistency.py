@@ -8,21 +8,25 @@ receiver's corrections, which must not be blamed for it.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import CLOCK_GROUPS, N_SATS, SAT_IDS
-from gbas_ground.corrections import formation as form
-from gbas_ground.corrections.sigma import Sigmas, broadcast_sigmas
+from gbas_ground.corrections.kernels import consistency as kernels
+from gbas_ground.corrections.sigma import measured_sigma_m
 from gbas_ground.exclusions import Latch, exclude, initial_latch
-from gbas_ground.monitors.b_value import channel_sigma_m, check_b_values, check_unused
-from gbas_ground.monitors.correction_limits import check_correction
-from gbas_ground.monitors.monitor_table import Summaries, summarise
-from gbas_ground.monitors.result import MonitorResult
+from gbas_ground.monitors.monitor_table import MonitorSummary, Summaries
 from gbas_ground.params import GroundParams
-from gbas_msgs_py.codes import ExclusionCause
-from gbas_msgs_py.monitors import B_VALUE, CORRECTION_LIMITS, MonitorTest
+from gbas_ground.prepared import PreparedStation
+from gbas_msgs_py.codes import ExclusionCause, Signal
+from gbas_msgs_py.monitors import B_VALUE, CORRECTION_LIMITS
+
+_TESTS: Final = (B_VALUE.key("b"), CORRECTION_LIMITS.key("prc"), CORRECTION_LIMITS.key("rrc"))
+# comparing arrays with members of an enumeration is slow
+_B_VALUE: Final = int(ExclusionCause.B_VALUE)
+_BY_BASELINES: Final = int(ExclusionCause.RECEIVER_BASELINES)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -51,11 +55,6 @@ class CorrectionInputs:
     judged: BoolArray
     elevation_rad: FloatArray
 
-    @property
-    def ready(self) -> BoolArray:
-        """Channels that may be used unless something excludes them, ``(R, N)``."""
-        return self.settled & self.judged
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Exclusions:
@@ -79,8 +78,7 @@ def no_exclusions(params: GroundParams) -> Exclusions:
     )
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Corrections:
+class Corrections(NamedTuple):
     """Corrections of one epoch; a satellite that is excluded has them too, for its own monitoring.
 
     Attributes
@@ -94,7 +92,8 @@ class Corrections:
         Channels behind each correction; `count` ``(N,)`` is their number.
     prc_m, rrc_mps : (tau, N) arrays
     b_m : (tau, R, N) array
-    sigmas : Sigmas
+    sigmas_m : (3, N) array
+        In the order of :class:`~gbas_ground.corrections.sigma.Sigmas` [m].
     channel_sigma_m : (tau, N) array
         One receiver's sigma, for the thresholds [m].
     """
@@ -107,7 +106,7 @@ class Corrections:
     prc_m: FloatArray
     rrc_mps: FloatArray
     b_m: FloatArray
-    sigmas: Sigmas
+    sigmas_m: FloatArray
     channel_sigma_m: FloatArray
 
 
@@ -121,99 +120,66 @@ class Finding:
     threshold: float
 
 
-def form_corrections(correction_inputs: CorrectionInputs, exclusions: Exclusions, params: GroundParams) -> Corrections:
-    """Corrections from everything that is not excluded."""
-    usable = correction_inputs.ready & exclusions.usable_channels()
-    in_use, common = form.common_satellites(
-        usable & ~exclusions.satellites.excluded,
-        min_common=params.monitors.min_common_satellites,
-        min_receivers=params.receivers.minimum,
+class Checks(NamedTuple):
+    """What the monitors of corrections say of B values, PRC and RRC, in this order, each ``(3, N)``.
+
+    Attributes
+    ----------
+    statistic, threshold : (3, N) arrays
+        Of the comparison that is furthest over its threshold, or nearest to it.
+    failed, due : (3, N) bool arrays
+    n_failed : int
+        How many of them fail.
+    """
+
+    statistic: FloatArray
+    threshold: FloatArray
+    failed: BoolArray
+    due: BoolArray
+    n_failed: int
+
+    def summaries(self) -> Summaries:
+        """What they say of each satellite."""
+        return {key: MonitorSummary(*(each[row] for each in self[:4]), Signal.L1) for row, key in enumerate(_TESTS)}
+
+
+def form_corrections(
+    correction_inputs: CorrectionInputs, exclusions: Exclusions, station: PreparedStation
+) -> tuple[Corrections, Checks]:
+    """Corrections from everything that is not excluded, and what their monitors say."""
+    settings, given = station.consistency, correction_inputs
+    usable = kernels.usable_channels(given.settled, given.judged, exclusions.channels.cause, exclusions.receivers.cause)
+    made = Corrections(*kernels.form_corrections(
+        given.correction_m, given.previous_m, given.dt_s, usable, exclusions.satellites.cause, given.elevation_rad,
+        measured_sigma_m(station.params, given.elevation_rad), settings,
+    ))  # fmt: skip
+    checks = kernels.summarise_corrections(
+        made.used, made.count, made.prc_m, made.rrc_mps, made.b_m, made.channel_sigma_m, settings
     )
-    elevation = None if params.monitors.clock_weighting == "plain" else correction_inputs.elevation_rad
-    weights = form.clock_weights(common, elevation)
-    adjusted = correction_inputs.correction_m - form.receiver_clock_m(correction_inputs.correction_m, weights)
-    used = usable & in_use[0][:, np.newaxis] & CLOCK_GROUPS[0] | usable & in_use[1][:, np.newaxis] & CLOCK_GROUPS[1]
-    used = used & np.isfinite(adjusted).all(axis=0)
-    count = used.sum(axis=0).astype(np.float64)
-    sigmas = broadcast_sigmas(params, correction_inputs.elevation_rad, count)
-    return Corrections(
-        in_use=in_use,
-        common=common,
-        weights=weights,
-        used=used,
-        count=count,
-        prc_m=form.average_m(adjusted, used),
-        rrc_mps=_rates(correction_inputs, used, weights, params),
-        b_m=form.b_values_m(adjusted, used),
-        sigmas=sigmas,
-        channel_sigma_m=channel_sigma_m(np.stack([sigmas.gnd_d_m, sigmas.gnd_30_m]), count, weights),
-    )
-
-
-def _rates(
-    correction_inputs: CorrectionInputs, used: BoolArray, weights: FloatArray, params: GroundParams
-) -> FloatArray:
-    """RRC from the channels that were there at the epoch before too, ``(tau, N)``."""
-    both = used & np.isfinite(correction_inputs.previous_m).all(axis=0)
-    if not np.array_equal(both, used):
-        of_clock = both & (weights > 0.0).any(axis=0)
-        _, common = form.common_satellites(of_clock, min_common=params.monitors.min_common_satellites, min_receivers=1)
-        weights = form.clock_weights(
-            common, None if params.monitors.clock_weighting == "plain" else correction_inputs.elevation_rad
-        )
-        both = both & np.isfinite(form.receiver_clock_m(correction_inputs.correction_m, weights)).all(axis=0)
-    return form.rate_mps(
-        correction_inputs.correction_m, correction_inputs.previous_m, correction_inputs.dt_s, weights, both
-    )
-
-
-def b_value_check(corrections: Corrections, params: GroundParams) -> MonitorResult:
-    """B values of both smoothing constants, ``(tau, R, N)``."""
-    return check_b_values(corrections.b_m, corrections.channel_sigma_m, corrections.used, params.b_value.k_b)
-
-
-def limit_checks(corrections: Corrections, params: GroundParams) -> tuple[tuple[MonitorTest, MonitorResult], ...]:
-    """Sizes of PRC and, where there is one, RRC, ``(tau, N)`` each."""
-    has = corrections.count > 0
-    has_rate = has & np.isfinite(corrections.rrc_mps).all(axis=0)
-    return (
-        (CORRECTION_LIMITS.test("prc"), check_correction(corrections.prc_m, has, params.correction_limits.max_prc_m)),
-        (
-            CORRECTION_LIMITS.test("rrc"),
-            check_correction(corrections.rrc_mps, has_rate, params.correction_limits.max_rrc_mps),
-        ),
-    )
-
-
-def consistency_summaries(corrections: Corrections, params: GroundParams) -> Summaries:
-    """What the monitors of the corrections say of each satellite."""
-    has = corrections.count > 0
-    limits = {
-        CORRECTION_LIMITS.key(test.name): summarise(result, has) for test, result in limit_checks(corrections, params)
-    }
-    several = corrections.used & (corrections.count >= 2)
-    return {B_VALUE.key("b"): summarise(b_value_check(corrections, params), several), **limits}
+    return made, Checks(*checks)
 
 
 def resolve_consistency(
-    correction_inputs: CorrectionInputs, exclusions: Exclusions, params: GroundParams
-) -> tuple[Corrections, Exclusions, tuple[Finding, ...]]:
+    correction_inputs: CorrectionInputs, exclusions: Exclusions, station: PreparedStation
+) -> tuple[Corrections, Checks, Exclusions, tuple[Finding, ...]]:
     """Exclude what disagrees, one thing at a time, until the rest agrees.
 
     Returns
     -------
     corrections : Corrections
         Formed from what is left.
+    checks : Checks
+        Of these.
     exclusions : Exclusions
     findings : tuple of Finding
         What was excluded, in that order.
     """
     findings: list[Finding] = []
     while True:
-        corrections = form_corrections(correction_inputs, exclusions, params)
-        step = _worst_b_value(corrections, exclusions, params) or _worst_limit(corrections, exclusions, params)
+        corrections, checks = form_corrections(correction_inputs, exclusions, station)
+        step = _worst(corrections, exclusions, station) if checks.n_failed else None
         if step is None:
-            return corrections, exclusions, tuple(findings)
+            return corrections, checks, exclusions, tuple(findings)
         exclusions, finding = step
         findings.append(finding)
 
@@ -221,29 +187,24 @@ def resolve_consistency(
 _Step = tuple[Exclusions, Finding]
 
 
-def _ratio(result: MonitorResult) -> FloatArray:
-    """Statistic over threshold where the monitor failed, else 0; a missing statistic is infinitely bad."""
-    ratio = np.where(result.failed, result.statistic / result.threshold, 0.0)
-    return np.where(np.isnan(ratio), np.inf, ratio)
+def _worst(corrections: Corrections, exclusions: Exclusions, station: PreparedStation) -> _Step | None:
+    """Exclude what fails worst: a B value first, then a size."""
+    return _worst_b_value(corrections, exclusions, station) or _worst_limit(corrections, exclusions, station)
 
 
-def _worst_b_value(corrections: Corrections, exclusions: Exclusions, params: GroundParams) -> _Step | None:
-    result = b_value_check(corrections, params)
-    if not result.failed.any():
+def _worst_b_value(corrections: Corrections, exclusions: Exclusions, station: PreparedStation) -> _Step | None:
+    count, params = corrections.count, station.params
+    receiver, satellite, value, threshold = kernels.worst_b_value(
+        corrections.used, count, corrections.b_m, corrections.channel_sigma_m, exclusions.satellites.cause,
+        station.consistency,
+    )  # fmt: skip
+    if satellite < 0:
         return None
-    # Two receivers do not tell which is wrong: then it is the satellite, once.
-    actionable = (corrections.count >= 3) | ~exclusions.satellites.excluded
-    ratio = np.where(actionable, _ratio(result), 0.0)
-    tau, receiver, satellite = (int(place) for place in np.unravel_index(int(ratio.argmax()), ratio.shape))
-    if ratio[tau, receiver, satellite] == 0.0:
-        return None
-    value, threshold = result.at(tau, receiver, satellite)
-    if corrections.count[satellite] < 3:
-        failed = np.arange(ratio.shape[-1]) == satellite
-        latch = exclude(exclusions.satellites, failed, ExclusionCause.B_VALUE)
+    if count[satellite] < 3:
+        latch = exclude(exclusions.satellites, np.arange(N_SATS) == satellite, ExclusionCause.B_VALUE)
         finding = Finding(subject=SAT_IDS[satellite], cause=ExclusionCause.B_VALUE, value=value, threshold=threshold)
         return replace(exclusions, satellites=latch), finding
-    mask = np.zeros(ratio.shape[1:], dtype=bool)
+    mask = np.zeros(exclusions.channels.cause.shape, dtype=bool)
     mask[receiver, satellite] = True
     channels = exclude(exclusions.channels, mask, ExclusionCause.B_VALUE)
     faults = int((channels.cause[receiver] == ExclusionCause.B_VALUE).sum())
@@ -261,23 +222,16 @@ def _worst_b_value(corrections: Corrections, exclusions: Exclusions, params: Gro
     return replace(exclusions, channels=channels), finding
 
 
-def _worst_limit(corrections: Corrections, exclusions: Exclusions, params: GroundParams) -> _Step | None:
-    best: tuple[float, ExclusionCause, MonitorResult, tuple[int, ...]] | None = None
-    for test, result in limit_checks(corrections, params):
-        if not result.failed.any():
-            continue
-        ratio = np.where(exclusions.satellites.excluded, 0.0, _ratio(result))
-        place = tuple(int(each) for each in np.unravel_index(int(ratio.argmax()), ratio.shape))
-        if ratio[place] > (best[0] if best else 0.0):
-            best = (float(ratio[place]), test.cause, result, place)
-    if best is None:
-        return None
-    _, cause, result, (tau, satellite) = best
-    latch = exclude(exclusions.satellites, np.arange(corrections.count.shape[-1]) == satellite, cause)
-    value, threshold = result.at(tau, satellite)
-    return replace(exclusions, satellites=latch), Finding(
-        subject=SAT_IDS[satellite], cause=cause, value=value, threshold=threshold
+def _worst_limit(corrections: Corrections, exclusions: Exclusions, station: PreparedStation) -> _Step | None:
+    kind, satellite, value, threshold = kernels.worst_limit(
+        corrections.count, corrections.prc_m, corrections.rrc_mps, exclusions.satellites.cause, station.consistency
     )
+    if satellite < 0:
+        return None
+    cause = (ExclusionCause.PRC_LIMIT, ExclusionCause.RRC_LIMIT)[kind]
+    latch = exclude(exclusions.satellites, np.arange(N_SATS) == satellite, cause)
+    finding = Finding(subject=SAT_IDS[satellite], cause=cause, value=value, threshold=threshold)
+    return replace(exclusions, satellites=latch), finding
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -292,17 +246,18 @@ class ReadmissionState:
 def readmission_state(
     correction_inputs: CorrectionInputs,
     corrections: Corrections,
+    checks: Checks,
     exclusions: Exclusions,
     channel_ok: BoolArray,
     receivers_quiet: FloatArray,
     satellite_ok: BoolArray,
-    params: GroundParams,
+    station: PreparedStation,
 ) -> ReadmissionState:
     """Judge what is not used against the corrections it has no part in.
 
     Parameters
     ----------
-    correction_inputs, corrections, exclusions
+    correction_inputs, corrections, checks, exclusions
         As they are after :func:`resolve_consistency`.
     channel_ok : (R, N) bool array
         Channels that are tracked and pass the monitors of single channels.
@@ -310,7 +265,7 @@ def readmission_state(
         1 where a receiver would do on its baselines, 0 where not, NaN where nobody can tell.
     satellite_ok : (N,) bool array
         Satellites that the monitors of signals were seen to pass.
-    params : GroundParams
+    station : PreparedStation
 
     Notes
     -----
@@ -319,35 +274,31 @@ def readmission_state(
     when it comes back. A receiver must not be seen to be wrong on its baselines; one that was excluded by them has to
     be seen to be right.
 
-    "To agree" is to be within `params.monitors.readmission_share` of the threshold: what is excluded just above it must
+    "To agree" is to be within `readmission_share` of the threshold: what is excluded just above it must
     not come back just below it.
 
     When the exclusions leave a constellation without a clock, nothing can be compared with anything, and no exclusion
     would ever end. Then everything is judged together as if nothing were excluded, and passes together or not at all.
     """
-    unused = correction_inputs.settled & ~corrections.used
-    result = check_unused(
-        _residual_m(correction_inputs, corrections, params),
-        corrections.channel_sigma_m,
-        corrections.count,
-        params.b_value.k_b,
+    settings = station.consistency
+    residual_m = kernels.residual_m(
+        correction_inputs.correction_m, correction_inputs.settled, corrections.common, corrections.prc_m, settings
     )
-    judged = unused & np.isfinite(result.statistic).all(axis=0) & (corrections.count > 0)
-    near = result.statistic <= params.monitors.readmission_share * result.threshold
-    agrees, disagrees = judged & near.all(axis=0), judged & result.failed.any(axis=0)
-    needs_comparison = exclusions.channels.cause == ExclusionCause.B_VALUE
+    agrees, disagrees = kernels.compare_unused(
+        residual_m, correction_inputs.settled, corrections.used, corrections.count, corrections.channel_sigma_m,
+        settings,
+    )  # fmt: skip
+    needs_comparison = exclusions.channels.cause == _B_VALUE
     channels = channel_ok & np.where(needs_comparison, agrees, ~disagrees)
-    receivers = (agrees.sum(axis=1) >= params.monitors.min_common_satellites) & ~disagrees.any(axis=1)
-    by_baselines = exclusions.receivers.cause == ExclusionCause.RECEIVER_BASELINES
+    receivers = (agrees.sum(axis=1) >= settings.min_common) & ~disagrees.any(axis=1)
+    by_baselines = exclusions.receivers.cause == _BY_BASELINES
     fits = (receivers_quiet == 1.0) | (np.isnan(receivers_quiet) & ~by_baselines)
 
-    seen = (corrections.count > 0) & np.isfinite(corrections.rrc_mps).all(axis=0)
-    within = ~np.asarray(np.any([result.failed.any(axis=0) for _, result in limit_checks(corrections, params)], axis=0))
-    consistent = ~b_value_check(corrections, params).failed.any(axis=(0, 1))
-    by_b = exclusions.satellites.cause == ExclusionCause.B_VALUE
-    satellites = satellite_ok & seen & within & consistent & (~by_b | (corrections.count >= 2))
+    consistent = checks.due[2] & ~np.logical_or.reduce(checks.failed)
+    by_b = exclusions.satellites.cause == _B_VALUE
+    satellites = satellite_ok & consistent & (~by_b | (corrections.count >= 2))
 
-    together = _together(correction_inputs, corrections, channel_ok, params)
+    together = _together(correction_inputs, corrections, channel_ok, station)
     return ReadmissionState(
         channels=channels | (channel_ok & together.channels),
         receivers=fits & (receivers | (together.receivers & ~disagrees.any(axis=1))),
@@ -356,7 +307,7 @@ def readmission_state(
 
 
 def _together(
-    correction_inputs: CorrectionInputs, corrections: Corrections, channel_ok: BoolArray, params: GroundParams
+    correction_inputs: CorrectionInputs, corrections: Corrections, channel_ok: BoolArray, station: PreparedStation
 ) -> ReadmissionState:
     """What passes in constellations without a clock when nothing is excluded there."""
     channels, receivers = np.zeros_like(channel_ok), np.zeros(len(channel_ok), dtype=bool)
@@ -369,25 +320,10 @@ def _together(
             settled=correction_inputs.settled & channel_ok,
             judged=np.ones_like(correction_inputs.judged),
         )
-        trial = form_corrections(free, no_exclusions(params), params)
-        results = [b_value_check(trial, params).failed.any(axis=0), *(r.failed for _, r in limit_checks(trial, params))]
-        failed = np.logical_or.reduce(np.concatenate(results), axis=0)
+        trial, checks = form_corrections(free, no_exclusions(station.params), station)
+        failed = np.logical_or.reduce(checks.failed)
         for k, group in enumerate(CLOCK_GROUPS):
             if stuck[k] and trial.common[k].any() and not np.any(failed & group):
                 channels = channels | (trial.used & group)
                 receivers = receivers | trial.in_use[k]
     return ReadmissionState(channels=channels, receivers=receivers, satellites=np.asarray(channels.any(axis=0)))
-
-
-def _residual_m(correction_inputs: CorrectionInputs, corrections: Corrections, params: GroundParams) -> FloatArray:
-    """PR_sc less PRC, with each receiver's clock estimated against the PRC of the common satellites it has."""
-    against = correction_inputs.correction_m - corrections.prc_m[:, np.newaxis, :]
-    usable = correction_inputs.settled & np.isfinite(against).all(axis=0) & corrections.common.any(axis=0)
-    residual = np.full(against.shape, np.nan)
-    for group in CLOCK_GROUPS:
-        own = usable & group
-        number = own.sum(axis=1)
-        total = np.where(own, against, 0.0).sum(axis=-1)
-        clock = np.where(number >= params.monitors.min_common_satellites, total / np.maximum(number, 1), np.nan)
-        residual = np.where(group, against - clock[..., np.newaxis], residual)
-    return residual

@@ -15,6 +15,8 @@ from gbas_ground.channels.predicted_ranges import Site, site_of
 from gbas_ground.channels.tracking import filter_params
 from gbas_ground.claims.limits import MAX_DECORRELATION
 from gbas_ground.claims.orbit_claim import OrbitSite, orbit_bound
+from gbas_ground.corrections.kernels.consistency import Settings
+from gbas_ground.corrections.sigma import settings_of
 from gbas_ground.ionosphere.places import Places, places_of
 from gbas_ground.monitors.carrier_acceleration import CarrierAccelerationParams
 from gbas_ground.monitors.ccd import CcdParams
@@ -65,6 +67,11 @@ class PreparedStation:
     def filters(self) -> ChannelFilterParams:
         """Settings of the channels' filters."""
         return filter_params(self.params)
+
+    @cached_property
+    def consistency(self) -> Settings:
+        """What the corrections are formed and judged with."""
+        return settings_of(self.params)
 
     @cached_property
     def frames(self) -> FrameSettings:

@@ -23,6 +23,7 @@ from gbas_ground.ionosphere.protection import initial_ionosphere
 from gbas_ground.long_term import initial_long_term
 from gbas_ground.params import GroundParams
 from gbas_ground.prepared import PreparedStation
+from gbas_ground.stages.channel_table import NO_CHANNELS
 from gbas_ground.stages.correct import CorrectState, correct
 from gbas_ground.stages.decide import DecideState, decide
 from gbas_ground.stages.monitor import MonitorState, initial_monitors, monitor_signals
@@ -101,7 +102,9 @@ class GroundStation:
             monitor=MonitorState(memories=initial_monitors(self._prepared), in_use=np.zeros(N_SATS, dtype=bool)),
             correct=CorrectState(previous=None, sigmas=initial_long_term(self.params)),
             decide=DecideState(ionosphere=initial_ionosphere()),
-            report=ReportState(status=nothing, contributing=np.zeros(count, dtype=bool), serving=False, channels=None),
+            report=ReportState(
+                status=nothing, contributing=np.zeros(count, dtype=bool), serving=False, channels=NO_CHANNELS
+            ),
         )
 
     def monitor(self, state: IntegrityState, epoch: GroundEpoch) -> tuple[IntegrityState, StationReport]:
@@ -161,7 +164,7 @@ class GroundStation:
             order=state.order,
             receive=replace(receiving, exclusions=corrected.exclusions),
             track=tracking,
-            monitor=replace(monitoring, in_use=decided.status.state == ChannelState.USABLE),
+            monitor=replace(monitoring, in_use=decided.status.usable),
             correct=correcting,
             decide=deciding,
             report=reporting,

@@ -7,22 +7,43 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gbas_core.satellites import IS_GPS, N_SATS
+from gbas_core.satellites import CLOCK_GROUPS, IS_GPS, N_SATS
 from gbas_core.signals import SPEED_OF_LIGHT_MPS
-from gbas_ground.corrections.formation import (
-    average_m,
-    b_values_m,
-    clock_removed_sigma_m,
-    clock_weights,
-    common_satellites,
-    range_correction_m,
-    rate_mps,
-    receiver_clock_m,
-)
+from gbas_ground.corrections.formation import range_correction_m
+from gbas_ground.corrections.kernels import formation as form
 from loop_corrections import corrections as by_loops
 
 # Values are metres of order 1e2; sums of tens of them round at about 1e-14 of that.
 ROUNDING_M = 1e-11
+
+
+CONSTELLATION = CLOCK_GROUPS.argmax(axis=0)
+
+
+def common_satellites(candidate, *, min_common, min_receivers):
+    return form.common_satellites(candidate, CONSTELLATION, len(CLOCK_GROUPS), min_common, min_receivers)
+
+
+def clock_weights(common, elevation_rad=None):
+    return form.clock_weights(
+        common, np.zeros(N_SATS) if elevation_rad is None else elevation_rad, elevation_rad is None
+    )
+
+
+def receiver_clock_m(correction_m, weights):
+    """Clock of each channel's receiver and constellation."""
+    return correction_m - form.remove_clocks(correction_m, weights, CONSTELLATION)
+
+
+average_m, b_values_m = form.average_m, form.b_values_m
+
+
+def clock_removed_sigma_m(sigma_m, weights):
+    return form.clock_removed_sigma_m(sigma_m, weights, CONSTELLATION)
+
+
+def rate_mps(correction_m, previous_m, dt_s, weights, used):
+    return form.rate_mps(correction_m, previous_m, dt_s, weights, used, CONSTELLATION)
 
 
 def formed(pr_sc, used, **choice):
@@ -86,20 +107,6 @@ def test_one_receiver_has_no_b_values():
     prc, b, used = formed(pr_sc, tracked)
     assert np.isnan(b).all()
     assert np.isfinite(prc).sum() == used.sum() > 0
-
-
-def test_leading_axes_are_alike():
-    """Smoothing constants and bands are just leading axes."""
-    values = np.random.default_rng(0).normal(size=(3, 2, 4, N_SATS))
-    used = np.random.default_rng(1).random((4, N_SATS)) < 0.9
-    _, common = common_satellites(used, min_common=1, min_receivers=1)
-    weights = clock_weights(common)
-    adjusted = values - receiver_clock_m(values, weights)
-    for place in np.ndindex(3, 2):
-        alone = values[place] - receiver_clock_m(values[place], weights)
-        assert np.array_equal(adjusted[place], alone, equal_nan=True)
-        assert np.array_equal(average_m(adjusted, used)[place], average_m(alone, used), equal_nan=True)
-        assert np.array_equal(b_values_m(adjusted, used)[place], b_values_m(alone, used), equal_nan=True)
 
 
 def test_correction_is_added_by_the_user():
@@ -177,9 +184,7 @@ def test_sigma_after_clock_removal_against_a_simulation():
     common = np.stack([np.arange(N_SATS) < 6, np.zeros(N_SATS, dtype=bool)])
     weights = clock_weights(common)
     n = 40_000
-    noise = rng.normal(size=(n, 1, N_SATS)) * sigma
+    noise = rng.normal(size=(n, N_SATS)) * sigma  # as many receivers
     rest = noise - receiver_clock_m(noise, weights)
     # the standard error of a sample sigma is 1/sqrt(2n) = 0.35 %; five of those
-    assert rest[:, 0, :8].std(axis=0) == pytest.approx(
-        clock_removed_sigma_m(sigma, weights)[:8], rel=5 / np.sqrt(2 * n)
-    )
+    assert rest[:, :8].std(axis=0) == pytest.approx(clock_removed_sigma_m(sigma, weights)[:8], rel=5 / np.sqrt(2 * n))

@@ -7,15 +7,18 @@ import pytest
 from scipy import stats
 
 from gbas_core.models.error_models import sigma_pr_gnd
-from gbas_core.satellites import N_SATS
-from gbas_ground.corrections.formation import b_values_m, clock_weights, receiver_clock_m
-from gbas_ground.monitors.b_value import MAX_B_VALUE_M, channel_sigma_m, check_b_values, check_unused
-from gbas_ground.monitors.correction_limits import check_correction
+from gbas_core.satellites import CLOCK_GROUPS, N_SATS
+from gbas_ground.corrections.kernels.consistency import summarise_corrections
+from gbas_ground.corrections.kernels.formation import b_values_m, clock_removed_sigma_m, clock_weights, remove_clocks
+from gbas_ground.corrections.kernels.limits import MAX_B_VALUE_M, b_limit_m, unused_limit_m
+from gbas_ground.corrections.sigma import settings_of
 from gbas_ground.monitors.ephemeris_change import check_ephemeris_change
 from gbas_ground.monitors.expected_range import check_expected_range
 from gbas_ground.monitors.signal_power import check_signal_power
+from ground_runs import params
 from synthetic_ranges import TOW_S, WEEK, constellation
 
+CONSTELLATION = CLOCK_GROUPS.argmax(axis=0)
 HERE = np.arange(N_SATS) < 12
 
 
@@ -56,15 +59,6 @@ def test_signal_power(required, expected):
     assert np.argwhere(result.failed).tolist() == expected
 
 
-def test_correction_limits():
-    prc = np.full((2, N_SATS), np.nan)
-    prc[:, HERE] = 10.0
-    prc[0, 1], prc[1, 2], prc[0, 3] = 327.68, -327.68, np.nan
-    prc[:, 4] = 327.67
-    result = check_correction(prc, HERE, 327.67)
-    assert np.argwhere(result.failed).tolist() == [[0, 1], [0, 3], [1, 2]]
-
-
 def test_ephemeris_change():
     """A satellite 2.4 km along its orbit from where the last ephemeris had it; 250 m is the bound."""
     old, new = constellation(iod=1), constellation(iod=2)
@@ -96,17 +90,33 @@ def test_false_alarms_of_b_values_follow_the_normal_tail(receivers, k_b):
     used = tracked(receivers)
     count = used.sum(axis=0).astype(float)
     sigma = sigma_pr_gnd("C", elevation, count)
-    weights = clock_weights(np.stack([HERE, np.zeros(N_SATS, dtype=bool)]))
+    weights = clock_weights(np.stack([HERE, np.zeros(N_SATS, dtype=bool)]), elevation, True)
     noise = rng.normal(size=(n, receivers, N_SATS)) * np.where(HERE, sigma * np.sqrt(receivers), np.nan)
     noise = noise + rng.normal(0.0, 1e4, (n, receivers, 1))
-    b = b_values_m(noise - receiver_clock_m(noise, weights), used)
-    result = check_b_values(b, channel_sigma_m(sigma, count, weights), used, k_b)
-    rate = result.failed[..., HERE].mean()
+    adjusted = remove_clocks(noise.reshape(-1, N_SATS), weights, CONSTELLATION).reshape(noise.shape)
+    b = np.array([b_values_m(each, used) for each in adjusted])
+    channel_sigma_m = clock_removed_sigma_m(sigma * np.sqrt(count), weights, CONSTELLATION)
+    limit_m = np.array([b_limit_m(*each, k_b) for each in zip(channel_sigma_m, count, strict=True)])
+    failed = ~(np.abs(b) <= limit_m)
+    rate = failed[..., HERE].mean()
     expected = 2.0 * stats.norm.sf(k_b)
     # The 12 satellites share clocks and the M B values of one satellite have M - 1 degrees of freedom: count one
     # independent sample an epoch, which is fewer than there are. Four standard errors.
     tolerance = 4.0 * np.sqrt(expected / n)
     assert rate == pytest.approx(expected, abs=tolerance)
+
+
+def failures(b, sigma, used):
+    """B values that fail, as the kernel has it of each satellite."""
+    settings, count = settings_of(params(2)), used.sum(axis=0).astype(float)
+    limit_m = np.array([b_limit_m(*each, settings.k_b) for each in zip(sigma, count, strict=True)])
+    checks = summarise_corrections(
+        used, count, np.zeros((1, N_SATS)), np.zeros((1, N_SATS)), b[np.newaxis], sigma[np.newaxis], settings
+    )
+    failed = used & (count >= 2) & ~(np.abs(b) <= limit_m)
+    assert np.array_equal(checks[2][0], failed.any(axis=0))
+    assert checks[4] == failed.any(axis=0).sum()
+    return [tuple(each) for each in np.argwhere(failed).tolist()]
 
 
 def test_b_value_needs_two_receivers_and_fits_the_message():
@@ -116,10 +126,9 @@ def test_b_value_needs_two_receivers_and_fits_the_message():
     b[:, 3] = np.nan
     b[0, 5] = MAX_B_VALUE_M + 0.01
     sigma = np.where(HERE, 100.0, np.nan)
-    result = check_b_values(b, sigma, used, 5.5)
-    assert np.argwhere(result.failed).tolist() == [[0, 5]]
+    assert failures(b, sigma, used) == [(0, 5)]
     sigma[7] = np.nan
-    assert np.argwhere(check_b_values(b, sigma, used, 5.5).failed).tolist() == [[0, 5], [0, 7], [1, 7]]
+    assert failures(b, sigma, used) == [(0, 5), (0, 7), (1, 7)]
 
 
 @pytest.mark.parametrize("count", [1, 3])
@@ -129,7 +138,7 @@ def test_channels_that_are_not_used_are_judged_at_the_same_rate(count):
     sigma = np.where(HERE, 0.3, np.nan)
     prc = rng.normal(size=(n, N_SATS)) * sigma / np.sqrt(count)
     channel = rng.normal(size=(n, 1, N_SATS)) * sigma
-    result = check_unused(channel - prc[:, np.newaxis], sigma, np.full(N_SATS, float(count)), k)
+    failed = ~(np.abs(channel - prc[:, np.newaxis]) <= unused_limit_m(0.3, float(count), k))
     n_samples = n * HERE.sum()
     expected = 2.0 * stats.norm.sf(k)
-    assert result.failed[..., HERE].mean() == pytest.approx(expected, abs=4.0 * np.sqrt(expected / n_samples))
+    assert failed[..., HERE].mean() == pytest.approx(expected, abs=4.0 * np.sqrt(expected / n_samples))

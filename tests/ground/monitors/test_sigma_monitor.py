@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, norm
 
+from array_corrections import b_failures
 from gbas_core.satellites import N_SATS
-from gbas_ground.monitors.b_value import check_b_values
 from gbas_ground.monitors.sigma_monitor import (
     SigmaMonitorParams,
     estimate_distribution,
@@ -172,9 +172,9 @@ def test_normalised_with_the_sigma_of_the_b_value_check():
     sigma = rng.uniform(0.05, 0.3, (2, N_SATS))
     count = used.sum(axis=0)
     b = np.where(used & (count >= 2), rng.normal(0.0, 0.5, (2, 4, N_SATS)), np.nan)
-    check = check_b_values(b, sigma, used, 5.5)
+    _, _, failed = b_failures(b, sigma, used, 5.5)
     normalised = normalised_b(b, sigma, used)
-    assert (check.failed == (np.abs(normalised) > 5.5)).all()
+    assert (failed == (np.abs(normalised) > 5.5)).all()
     assert np.isnan(normalised[:, :, count < 2]).all()
 
 

@@ -12,11 +12,12 @@ processing modes", eq (8) to (12).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gbas_core.compiled import as_written, compiled
 from gbas_core.record import FloatArray
 
 GroundAccuracy = Literal["A", "B", "C"]
@@ -94,6 +95,13 @@ def iono_m(factor, gradient, distance_m, speed_mps, tau_s):  # type: ignore[no-u
     return factor * gradient * (distance_m + 2.0 * tau_s * speed_mps)
 
 
+@compiled
+def ground_curve(a0_m: float, a1_m: float, theta0_deg: float, a2_m: float, theta_deg: Any, number: Any) -> Any:
+    """Ground error of a :class:`GroundCurve` at an elevation for the mean of a number of receivers [m]."""
+    single = a0_m + a1_m * np.exp(-theta_deg / theta0_deg)
+    return np.sqrt(single**2 / number + a2_m**2)
+
+
 def _elevation_deg(elevation_rad: ArrayLike, mask_rad: float) -> FloatArray:
     """Elevation in degrees, NaN below the mask."""
     elevation_deg = np.rad2deg(np.asarray(elevation_rad, dtype=np.float64))
@@ -107,15 +115,33 @@ def ground_curve_m(
     theta_deg = _elevation_deg(elevation_rad, mask_rad)
     number = np.asarray(n_receivers, dtype=np.float64)
     number = np.where(number >= 1.0, number, np.nan)
-    single = curve_m(theta_deg, curve.a0_m, curve.a1_m, curve.theta0_deg)
-    result: FloatArray = np.sqrt(single**2 / number + curve.a2_m**2)
-    return result
+    return np.asarray(
+        as_written(ground_curve)(curve.a0_m, curve.a1_m, curve.theta0_deg, curve.a2_m, theta_deg, number)
+    )
 
 
 def airborne_curve_m(curve: AirborneCurve, elevation_rad: ArrayLike, *, mask_rad: float = MASK_RAD) -> FloatArray:
     """Airborne error of `curve` [m]."""
     theta_deg = _elevation_deg(elevation_rad, mask_rad)
     return np.asarray(curve_m(theta_deg, curve.a0_m, curve.a1_m, curve.theta0_deg))
+
+
+GROUND_CURVES: Final[dict[GroundAccuracy, tuple[GroundCurve, GroundCurve]]] = {
+    "A": (GAD_A, GAD_A),
+    "B": (GAD_B, GAD_B),
+    "C": (GAD_C_LOW, GAD_C_HIGH),
+}
+"""Of each designator, up to GAD_C_STEP_DEG and above."""
+
+
+@compiled
+def sigma_pr_gnd_of(curves: FloatArray, elevation_rad: float, number: float, mask_rad: float) -> float:
+    """:func:`sigma_pr_gnd` of one satellite; `curves` ``(2, 4)`` are the coefficients below and above the step."""
+    theta_deg = np.rad2deg(elevation_rad)
+    if not (theta_deg >= np.rad2deg(mask_rad) - EDGE_DEG and number >= 1.0):
+        return np.nan
+    a = curves[1 if theta_deg > GAD_C_STEP_DEG + EDGE_DEG else 0]
+    return float(ground_curve(a[0], a[1], a[2], a[3], theta_deg, number))
 
 
 def sigma_pr_gnd(

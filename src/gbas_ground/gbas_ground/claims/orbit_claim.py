@@ -30,11 +30,13 @@ is ours: the message has no code for it.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
 
+from gbas_core.compiled import compiled
 from gbas_core.record import BoolArray, FloatArray
 from gbas_ground.claims.limits import MAX_DECORRELATION
 from gbas_ground.monitors.carrier_noise import CarrierNoise
@@ -137,7 +139,8 @@ def orbit_bound(differences: DoubleDifferences, elevation_rad: FloatArray, site:
     return bound
 
 
-def claimed_decorrelation(supported: FloatArray, least: float, *, external: bool = False) -> FloatArray:
+@compiled
+def claimed_decorrelation(supported: FloatArray, least: float, external: bool = False) -> FloatArray:
     """P as it is broadcast, in steps of the message, rounded up.
 
     Parameters
@@ -154,9 +157,12 @@ def claimed_decorrelation(supported: FloatArray, least: float, *, external: bool
     (N,) array
         [m/m]; the largest that the message carries where more would be needed.
     """
-    wanted = np.full(supported.shape, least) if external else np.maximum(supported, least)
-    bounded = np.where(wanted <= MAX_DECORRELATION, wanted, MAX_DECORRELATION)
-    return np.asarray(np.ceil(bounded / DECORRELATION_STEP - 1e-6) * DECORRELATION_STEP)
+    claimed = np.empty(len(supported))
+    for i in range(len(supported)):
+        wanted = least if external or supported[i] < least else supported[i]
+        bounded = wanted if wanted <= MAX_DECORRELATION else MAX_DECORRELATION
+        claimed[i] = math.ceil(bounded / DECORRELATION_STEP - 1e-6) * DECORRELATION_STEP
+    return claimed
 
 
 def refuse_smaller(key: str, value: float, site: OrbitSite, mask_rad: float, *, excludes: bool) -> None:

@@ -6,12 +6,16 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from gbas_core.models.error_models import sigma_pr_gnd
+from gbas_core.models.error_models import GROUND_CURVES
 from gbas_core.record import FloatArray
+from gbas_core.satellites import CLOCK_GROUPS
+from gbas_ground.corrections.kernels.consistency import Settings, broadcast_sigmas_m
 from gbas_ground.params import GroundParams
 
 MAX_SIGMA_M: Final = 5.08
 """Largest sigma a message can carry. Source: ICAO Annex 10 vol. I, table B-63."""
+
+_NOTHING: Final[FloatArray] = np.empty(0)
 
 
 class Sigmas(NamedTuple):
@@ -42,13 +46,36 @@ def broadcast_sigmas(params: GroundParams, elevation_rad: FloatArray, count: Flo
     (known). The factor of the 30 s corrections, sqrt(100/30), is that of white noise through the two filters:
     uncertain, ours.
     """
-    if params.accuracy.sigma_elevation_rad:
-        single = np.interp(elevation_rad, params.accuracy.sigma_elevation_rad, params.accuracy.sigma_m)
-        low = elevation_rad < params.monitors.elevation_mask_rad
-        base = np.where((count > 0) & ~low, single / np.sqrt(np.maximum(count, 1)), np.nan)
-    else:
-        base = sigma_pr_gnd(
-            params.accuracy.designator, elevation_rad, count, mask_rad=params.monitors.elevation_mask_rad
-        )
-    gnd_d = params.accuracy.inflation * base
-    return Sigmas(params.accuracy.inflation_iono * gnd_d, gnd_d, params.accuracy.factor_30s * gnd_d)
+    return Sigmas(
+        *broadcast_sigmas_m(elevation_rad, count, measured_sigma_m(params, elevation_rad), settings_of(params))
+    )
+
+
+def measured_sigma_m(params: GroundParams, elevation_rad: FloatArray) -> FloatArray:
+    """One receiver's measured sigma ``(N,)`` [m]; empty where the station has a designator instead."""
+    accuracy = params.accuracy
+    if not accuracy.sigma_elevation_rad:
+        return _NOTHING
+    return np.asarray(np.interp(elevation_rad, accuracy.sigma_elevation_rad, accuracy.sigma_m))
+
+
+def settings_of(params: GroundParams) -> Settings:
+    """What the station's corrections are formed and judged with."""
+    accuracy, monitors = params.accuracy, params.monitors
+    curves = [(each.a0_m, each.a1_m, each.theta0_deg, each.a2_m) for each in GROUND_CURVES[accuracy.designator]]
+    return Settings(
+        constellation=CLOCK_GROUPS.argmax(axis=0).astype(np.int64),
+        curves=np.array(curves),
+        n_constellations=len(CLOCK_GROUPS),
+        min_common=int(monitors.min_common_satellites),
+        min_receivers=int(params.receivers.minimum),
+        plain=monitors.clock_weighting == "plain",
+        mask_rad=float(monitors.elevation_mask_rad),
+        inflation=float(accuracy.inflation),
+        inflation_iono=float(accuracy.inflation_iono),
+        factor_30s=float(accuracy.factor_30s),
+        k_b=float(params.b_value.k_b),
+        max_prc_m=float(params.correction_limits.max_prc_m),
+        max_rrc_mps=float(params.correction_limits.max_rrc_mps),
+        readmission_share=float(monitors.readmission_share),
+    )

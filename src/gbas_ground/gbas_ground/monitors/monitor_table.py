@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from functools import lru_cache
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -11,9 +12,10 @@ from numpy.typing import NDArray
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import N_SATS, RANGING_SOURCE_ID
 from gbas_core.signals import L1, L2, L5
+from gbas_ground.monitors.kernels.table import monitor_rows, shown_only
 from gbas_ground.monitors.kernels.worst import worst_along
 from gbas_ground.monitors.result import MonitorResult
-from gbas_msgs_py.codes import MonitorState, Signal
+from gbas_msgs_py.codes import Signal
 from gbas_msgs_py.monitors import TESTS, TestKey
 from gbas_msgs_py.records import MonitorDetailEpoch, MonitorEpoch
 
@@ -124,38 +126,46 @@ def monitor_epoch(gps_week: int, tow_s: float, summaries: Summaries, shown: Bool
     shown : (N,) bool array
         Satellites that have rows.
     """
-    keys = [key for key in TESTS if key in summaries]
+    keys = tuple([key for key in TESTS if key in summaries])
     if not keys:
         return MonitorEpoch(gps_week=gps_week, tow_s=tow_s)
-    columns = zip(*(summaries[key][:4] for key in keys), strict=True)
-    statistic, threshold, failed, due = (np.stack(column) for column in columns)
-    looked = np.isfinite(statistic + threshold)
-    state = np.where(looked, float(MonitorState.PASSED), float(MonitorState.NOT_MONITORED))
-    state = np.where(failed, float(MonitorState.FAILED), state)
-    place, satellite = np.nonzero((due | failed) & shown)
-    monitor, test = np.array(keys, dtype=np.float64).T
-    signal = np.array([float(summaries[key].signal) for key in keys])
-    at = place, satellite
+    statistic, threshold, failed, due, signal = zip(*(summaries[key] for key in keys), strict=True)
+    rows = monitor_rows(
+        np.concatenate(statistic), np.concatenate(threshold), np.concatenate(failed), np.concatenate(due), shown,
+        _about(keys, signal), _SOURCE_ID,
+    )  # fmt: skip
     return MonitorEpoch(
         gps_week=gps_week,
         tow_s=tow_s,
-        monitor=monitor[place],
-        test=test[place],
-        sat=_SOURCE_ID[satellite],
-        signal=signal[place],
-        statistic=np.where(looked, statistic, np.nan)[at],
-        threshold=np.where(looked, threshold, np.nan)[at],
-        state=state[at],
+        monitor=rows[0],
+        test=rows[1],
+        sat=rows[2],
+        signal=rows[3],
+        statistic=rows[4],
+        threshold=rows[5],
+        state=rows[6],
     )
+
+
+@lru_cache(maxsize=16)
+def _about(keys: tuple[TestKey, ...], signals: tuple[Signal, ...]) -> FloatArray:
+    """Numbers of monitor and test, and signal, ``(K, 3)``."""
+    return np.array([(*key, signal) for key, signal in zip(keys, signals, strict=True)], dtype=np.float64)
 
 
 def monitor_detail_epoch(
     gps_week: int, tow_s: float, details: Mapping[str, Any], shown: BoolArray
 ) -> MonitorDetailEpoch:
     """The table of what is behind the statistics; `details` are its fields."""
-    return MonitorDetailEpoch(
-        gps_week=gps_week, tow_s=tow_s, **{name: np.where(shown, value, np.nan) for name, value in details.items()}
-    )
+    if not details:
+        return MonitorDetailEpoch(gps_week=gps_week, tow_s=tow_s)
+    rows = shown_only(np.concatenate(tuple(details.values()), axis=None, dtype=np.float64), shown)
+    fields, begin = {}, 0
+    for name, value in details.items():
+        end = begin + value.size // N_SATS
+        fields[name] = rows[begin:end].reshape(value.shape)
+        begin = end
+    return MonitorDetailEpoch(gps_week=gps_week, tow_s=tow_s, **fields)
 
 
 def moved(result: MonitorResult, source: int, destination: int) -> MonitorResult:

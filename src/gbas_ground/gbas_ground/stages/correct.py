@@ -12,11 +12,11 @@ from gbas_core.record import BoolArray, FloatArray
 from gbas_core.signals import L1
 from gbas_ground.channels.predicted_ranges import Site, predict_ranges
 from gbas_ground.consistency import (
+    Checks,
     CorrectionInputs,
     Corrections,
     Exclusions,
     Finding,
-    consistency_summaries,
     readmission_state,
     resolve_consistency,
 )
@@ -89,15 +89,15 @@ def correct(state: CorrectState, monitored: Monitored, station: PreparedStation)
     tracked, params = monitored.tracked, station.params
     dt_s = tracked.received.now.dt_s
     inputs = _correction_inputs(state.previous, monitored, station)
-    corrections, exclusions, of_corrections = resolve_consistency(inputs, monitored.exclusions, params)
+    corrections, checks, exclusions, of_corrections = resolve_consistency(inputs, monitored.exclusions, station)
     sigmas, exclusions, of_sigmas, sigma_summaries = monitor_sigmas(state.sigmas, corrections, exclusions, dt_s, params)
     corrected = Corrected(
         monitored=monitored,
         inputs=inputs,
         corrections=corrections,
-        summaries={**consistency_summaries(corrections, params), **sigma_summaries},
+        summaries={**checks.summaries(), **sigma_summaries},
         findings=(*monitored.findings, *of_corrections, *of_sigmas),
-        exclusions=_advanced(exclusions, inputs, corrections, monitored, station),
+        exclusions=_advanced(exclusions, inputs, corrections, checks, monitored, station),
     )
     return CorrectState(previous=_previous(tracked), sigmas=sigmas), corrected
 
@@ -149,6 +149,7 @@ def _advanced(
     exclusions: Exclusions,
     inputs: CorrectionInputs,
     corrections: Corrections,
+    checks: Checks,
     monitored: Monitored,
     station: PreparedStation,
 ) -> Exclusions:
@@ -160,7 +161,7 @@ def _advanced(
     satellite_ok = signals.passed(params.monitors.readmission_share)
     channel_ok = monitored.tracked.channel_ok
     passed = readmission_state(
-        inputs, corrections, exclusions, channel_ok, signals.receivers_quiet, satellite_ok, params
+        inputs, corrections, checks, exclusions, channel_ok, signals.receivers_quiet, satellite_ok, station
     )
     return Exclusions(
         channels=advance(exclusions.channels, passed.channels, dt_s, params.smoothing.max_gap_s),

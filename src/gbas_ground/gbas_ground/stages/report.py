@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gbas_core.record import BoolArray
+from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import SAT_IDS
 from gbas_ground.broadcast import empty_integrity
 from gbas_ground.monitors.monitor_table import monitor_detail_epoch, monitor_epoch
@@ -15,9 +15,10 @@ from gbas_ground.stages.channel_table import channel_epoch
 from gbas_ground.stages.correct import Corrected
 from gbas_ground.stages.decide import Decided
 from gbas_ground.stages.integrity_table import integrity_of
+from gbas_ground.stages.kernels.status import used_of_usable
 from gbas_ground.stages.receive import GroundEpoch
 from gbas_ground.stages.satellite_status import SatelliteStatus
-from gbas_msgs_py.codes import ChannelState, EventKind, ExclusionCause
+from gbas_msgs_py.codes import EventKind, ExclusionCause
 from gbas_msgs_py.events import Event, EventLog
 from gbas_msgs_py.records import ChannelEpoch, IntegrityEpoch, MonitorDetailEpoch, MonitorEpoch
 
@@ -57,14 +58,14 @@ class ReportState:
         Receivers behind the corrections.
     serving : bool
         Whether there were corrections.
-    channels : ChannelEpoch or None
-        The executive's table.
+    channels : array
+        The executive's table, of :func:`~gbas_ground.stages.channel_table.channel_epoch`.
     """
 
     status: SatelliteStatus
     contributing: BoolArray
     serving: bool
-    channels: ChannelEpoch | None
+    channels: FloatArray
 
 
 def report(state: ReportState, decided: Decided, station: PreparedStation) -> tuple[ReportState, StationReport]:
@@ -73,10 +74,10 @@ def report(state: ReportState, decided: Decided, station: PreparedStation) -> tu
     tracked, signals = corrected.monitored.tracked, corrected.monitored.signals
     now = tracked.received.now
     time = now.gps_week, now.tow_s
-    integrity = integrity_of(decided, station.params)
-    channels = channel_epoch(decided, state.channels)
-    usable = status.state == ChannelState.USABLE
-    serving, contributing = bool(usable.any()), (corrected.corrections.used & usable).any(axis=1)
+    used, contributing = used_of_usable(corrected.corrections.used, status.state)
+    integrity = integrity_of(decided, used, int(np.count_nonzero(contributing)), station.params)
+    table, channels = channel_epoch(decided, state.channels)
+    serving = bool(status.usable.any())
     _contribution_events(state.contributing, contributing, corrected, now.events)
     _satellite_events(state, decided, serving, now.events)
     shown = np.isfinite(integrity.state)
@@ -88,7 +89,7 @@ def report(state: ReportState, decided: Decided, station: PreparedStation) -> tu
         channels=channels,
         events=now.events.all(),
     )
-    return ReportState(status=status, contributing=contributing, serving=serving, channels=channels), made
+    return ReportState(status=status, contributing=contributing, serving=serving, channels=table), made
 
 
 def refusal(epoch: GroundEpoch, events: EventLog) -> StationReport:
@@ -105,6 +106,8 @@ def refusal(epoch: GroundEpoch, events: EventLog) -> StationReport:
 
 def _contribution_events(before: BoolArray, contributing: BoolArray, corrected: Corrected, events: EventLog) -> None:
     """Receivers that went out of the corrections, or came into them, without an event of their own."""
+    if not (before != contributing).any():
+        return
     raw = corrected.monitored.tracked.received.raw
     told = ~raw.present | corrected.exclusions.receivers.excluded
     for row in np.flatnonzero(before & ~contributing & ~told):
@@ -115,7 +118,9 @@ def _contribution_events(before: BoolArray, contributing: BoolArray, corrected: 
 
 def _satellite_events(state: ReportState, decided: Decided, serving: bool, events: EventLog) -> None:
     """Satellites that came into use or went out of it, and the station with the first and the last of them."""
-    now, was = decided.status.state == ChannelState.USABLE, state.status.state == ChannelState.USABLE
+    now, was = decided.status.usable, state.status.usable
+    if not (now != was).any():
+        return
     told = {finding.subject for finding in decided.corrected.findings}
     for satellite in np.flatnonzero(now != was):
         subject = SAT_IDS[satellite]

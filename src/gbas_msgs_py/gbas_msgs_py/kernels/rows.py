@@ -160,7 +160,8 @@ def satellite_columns(
     seen = np.zeros(n_sats, dtype=np.bool_)
     for row in range(0 if is_marker(table, n_head) else table.shape[0]):
         number = table[row, n_head]
-        sat = index_of[int(number)] if 0.0 <= number < len(index_of) and number == math.floor(number) else -1
+        source = int(number) if 0.0 <= number < len(index_of) else -1
+        sat = index_of[source] if source == number else -1
         if sat < 0:
             if unknown < 0:
                 unknown = row
@@ -208,10 +209,8 @@ def check_codes(block: FloatArray, codes: Codes) -> tuple[int, int, int]:
         key = 0
         for coded in range(len(codes.place)):
             value = block[codes.place[coded] * n_rows + row]
-            if not (0.0 <= value < codes.known.shape[1]) or value != math.floor(value):
-                return row, coded, -1
-            number = int(value)
-            if not codes.known[coded, number]:
+            number = int(value) if 0.0 <= value < codes.known.shape[1] else -1
+            if number != value or not codes.known[coded, number]:
                 return row, coded, -1
             key += codes.weights[coded] * number
         if keyed:

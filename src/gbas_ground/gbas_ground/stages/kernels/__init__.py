@@ -1,0 +1,1 @@
+"""Loops over receivers and satellites of the stages."""
