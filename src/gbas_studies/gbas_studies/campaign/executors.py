@@ -1,0 +1,139 @@
+"""Where batches of trials run: in this process, in local workers, or on the workers of a scheduler."""
+
+from __future__ import annotations
+
+import logging
+import math
+import pickle
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from typing import TYPE_CHECKING, Any
+
+from gbas_studies.campaign.errors import CampaignError
+from gbas_studies.campaign.version import library_versions, suite_version
+from gbas_studies.campaign.work import Line, Numbered, Work, run_batch, run_packed_batch
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+Executor = Callable[[Work, Sequence[Numbered], int], Iterator[list[Line]]]
+"""Gives the results of numbered trials, in batches of at most so many, in the order in which they are done."""
+
+_BATCHES_A_WORKER = 8  # so that the last to finish are not waited for long
+_WAIT_S = 30.0
+
+
+def in_this_process(work: Work, trials: Sequence[Numbered], batch: int) -> Iterator[list[Line]]:
+    """Run trials one by one."""
+    context = work.prepare(work.settings)
+    for each in trials:
+        yield run_batch(work, context, [each])
+
+
+@contextmanager
+def executor(workers: int, scheduler: str | None) -> Iterator[Executor]:
+    """Open what runs the trials.
+
+    Parameters
+    ----------
+    workers : int
+        Processes on this machine, with one thread each; 1: this process itself, without dask.
+    scheduler : str or None
+        Address of a scheduler of dask, whose workers are used instead.
+
+    Raises
+    ------
+    CampaignError
+        When no scheduler answers there, or it has no worker.
+    """
+    if scheduler is not None:
+        with _client(scheduler) as client:
+            yield _OnDask(client)
+    elif workers == 1:
+        yield in_this_process
+    else:
+        with _local_cluster(workers) as address, _client(address) as client:
+            yield _OnDask(client)
+
+
+@contextmanager
+def _local_cluster(workers: int) -> Iterator[str]:
+    from distributed import LocalCluster
+
+    # its processes have OMP_NUM_THREADS=1 and the like from dask
+    with LocalCluster(
+        n_workers=workers,
+        threads_per_worker=1,
+        processes=True,
+        host="127.0.0.1",
+        dashboard_address="127.0.0.1:0",
+        scheduler_kwargs={"dashboard": False},
+        silence_logs=logging.CRITICAL,
+    ) as cluster:
+        yield cluster.scheduler_address
+
+
+@contextmanager
+def _client(address: str) -> Iterator[Client]:
+    from distributed import Client
+
+    try:
+        client = Client(address, timeout=_WAIT_S)
+    except (OSError, ValueError) as error:
+        raise CampaignError(f"no scheduler of dask answers at {address}: {error}") from None
+    with client:
+        try:
+            client.wait_for_workers(1, timeout=_WAIT_S)
+        except TimeoutError:
+            raise CampaignError(f"the scheduler {address} has no worker: start some with dask worker") from None
+        yield client
+
+
+class _OnDask:
+    """Batches as tasks of dask, which gives those of a lost worker to another."""
+
+    def __init__(self, client: Client) -> None:
+        self._client = client
+
+    def __call__(self, work: Work, trials: Sequence[Numbered], batch: int) -> Iterator[list[Line]]:
+        from distributed import as_completed
+
+        workers = len(self._client.nthreads())
+        size = max(1, min(batch, math.ceil(len(trials) / (_BATCHES_A_WORKER * workers))))
+        # what all batches need is a task of its own: it goes once to each worker, and is made anew when one is lost
+        packed = self._client.submit(bytes, pickle.dumps(work), pure=False)
+        versions = (suite_version(), library_versions())
+        futures = [
+            self._client.submit(
+                run_packed_batch, packed, pickle.dumps(trials[at : at + size]), versions, pure=False, retries=0
+            )
+            for at in range(0, len(trials), size)
+        ]
+        try:
+            for future in as_completed(futures):
+                yield _result(future)
+                future.release()
+        finally:
+            with suppress(Exception):  # the scheduler may be what was lost
+                self._client.cancel(futures)
+
+
+def _result(future: Any) -> list[Line]:
+    from concurrent.futures import CancelledError
+
+    from distributed import KilledWorker
+    from distributed.comm.core import CommClosedError
+
+    try:
+        lines: list[Line] = future.result()
+    except KilledWorker as error:
+        raise CampaignError(
+            f"the same trials ended {error.allowed_failures + 1} workers: is there memory for them?"
+        ) from None
+    except (CancelledError, CommClosedError):
+        raise CampaignError("the scheduler is lost; what is done is kept, if there is a file for it") from None
+    except (ModuleNotFoundError, AttributeError) as error:
+        if "gbas_" not in str(error):
+            raise
+        raise CampaignError(f"a worker has another suite, or none: {error}; install the same there") from None
+    return lines
