@@ -258,6 +258,16 @@ def test_a_worker_with_threads_is_refused():
         run(toy_campaign(TRIALS), Execution(scheduler=threads.scheduler_address))
 
 
+def test_without_any_worker_left_it_ends(lonely_scheduler, tmp_path, monkeypatch):
+    monkeypatch.setattr("gbas_studies.campaign.executors._LOOK_S", 0.2)
+    trials = ["deadly" if number == 20 else "plain" for number in range(len(TRIALS))]
+    out = tmp_path / "kept.jsonl"
+    with worker(lonely_scheduler, tmp_path), pytest.raises(CampaignError, match="no worker is left"):
+        run(toy_campaign(trials, notes=tmp_path), Execution(scheduler=lonely_scheduler, out=out))
+    found = run(toy_campaign(trials, notes=tmp_path), Execution(out=out))
+    assert [each.number for each in found] == list(range(len(TRIALS)))
+
+
 def test_no_scheduler(monkeypatch):
     monkeypatch.setattr("gbas_studies.campaign.executors._WAIT_S", 0.5)
     with pytest.raises(CampaignError, match="no scheduler of dask answers at tcp://127.0.0.1:1"):

@@ -7,11 +7,12 @@ import math
 import pickle
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from queue import Empty, Queue
 from typing import TYPE_CHECKING, Any
 
 from gbas_studies.campaign.errors import CampaignError
 from gbas_studies.campaign.version import library_versions, suite_version
-from gbas_studies.campaign.work import Line, Numbered, Work, run_batch, run_packed_batch
+from gbas_studies.campaign.work import Line, Numbered, Work, run_batch
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -20,7 +21,8 @@ Executor = Callable[[Work, Sequence[Numbered], int], Iterator[list[Line]]]
 """Gives the results of numbered trials, in batches of at most so many, in the order in which they are done."""
 
 _BATCHES_A_WORKER = 8  # so that the last to finish are not waited for long
-_WAIT_S = 30.0
+_WAIT_S = 30.0  # for a scheduler and its first worker
+_LOOK_S = 60.0  # without a batch done: is there any worker left?
 
 
 def in_this_process(work: Work, trials: Sequence[Numbered], batch: int) -> Iterator[list[Line]]:
@@ -96,26 +98,47 @@ class _OnDask:
         self._client = client
 
     def __call__(self, work: Work, trials: Sequence[Numbered], batch: int) -> Iterator[list[Line]]:
-        from distributed import as_completed
-
         workers = len(self._client.nthreads())
         size = max(1, min(batch, math.ceil(len(trials) / (_BATCHES_A_WORKER * workers))))
         # what all batches need is a task of its own: it goes once to each worker, and is made anew when one is lost
         packed = self._client.submit(bytes, pickle.dumps(work), pure=False)
-        versions = (suite_version(), library_versions())
-        futures = [
-            self._client.submit(
-                run_packed_batch, packed, pickle.dumps(trials[at : at + size]), versions, pure=False, retries=0
-            )
+        versions, task = (suite_version(), library_versions()), _task()
+        pending = {
+            self._client.submit(task, packed, pickle.dumps(trials[at : at + size]), versions, pure=False)
             for at in range(0, len(trials), size)
-        ]
+        }
+        done: Queue[Any] = Queue()
+        for future in pending:
+            future.add_done_callback(done.put)
         try:
-            for future in as_completed(futures):
+            while pending:
+                future = self._next(done)
                 yield _result(future)
+                pending.remove(future)
                 future.release()
         finally:
             with suppress(Exception):  # the scheduler may be what was lost
-                self._client.cancel(futures)
+                self._client.cancel(list(pending))
+
+    def _next(self, done: Queue[Any]) -> Any:
+        """The next batch that is done; as long as there is a worker it is waited for."""
+        while True:
+            try:
+                return done.get(timeout=_LOOK_S)
+            except Empty:
+                if not self._client.nthreads():
+                    raise CampaignError("no worker is left; what is done is kept, if there is a file for it") from None
+
+
+def _task() -> Callable[..., list[Line]]:
+    """What a worker is told to do: a function sent by value, so that one without the suite can say that it has none."""
+
+    def run_there(*arguments: Any) -> list[Line]:
+        from gbas_studies.campaign.work import run_packed_batch
+
+        return run_packed_batch(*arguments)
+
+    return run_there
 
 
 def _result(future: Any) -> list[Line]:
