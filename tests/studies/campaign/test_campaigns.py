@@ -260,6 +260,7 @@ def test_a_worker_with_threads_is_refused():
 
 def test_without_any_worker_left_it_ends(lonely_scheduler, tmp_path, monkeypatch):
     monkeypatch.setattr("gbas_studies.campaign.executors._LOOK_S", 0.2)
+    monkeypatch.setattr("gbas_studies.campaign.executors._LOST_S", 0.2)
     trials = ["deadly" if number == 20 else "plain" for number in range(len(TRIALS))]
     out = tmp_path / "kept.jsonl"
     with worker(lonely_scheduler, tmp_path), pytest.raises(CampaignError, match="no worker is left"):

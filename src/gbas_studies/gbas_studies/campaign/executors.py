@@ -23,6 +23,7 @@ Executor = Callable[[Work, Sequence[Numbered], int], Iterator[list[Line]]]
 _BATCHES_A_WORKER = 8  # so that the last to finish are not waited for long
 _WAIT_S = 30.0  # for a scheduler and its first worker
 _LOOK_S = 60.0  # without a batch done: is there any worker left?
+_LOST_S = 30.0  # for a worker to come back
 
 
 def in_this_process(work: Work, trials: Sequence[Numbered], batch: int) -> Iterator[list[Line]]:
@@ -113,7 +114,9 @@ class _OnDask:
         try:
             while pending:
                 future = self._next(done)
-                yield _result(future)
+                with _explained():
+                    lines = self._lines(future)
+                yield lines
                 pending.remove(future)
                 future.release()
         finally:
@@ -121,13 +124,31 @@ class _OnDask:
                 self._client.cancel(list(pending))
 
     def _next(self, done: Queue[Any]) -> Any:
-        """The next batch that is done; as long as there is a worker it is waited for."""
+        """The next batch that is done."""
         while True:
             try:
                 return done.get(timeout=_LOOK_S)
             except Empty:
-                if not self._client.nthreads():
-                    raise CampaignError("no worker is left; what is done is kept, if there is a file for it") from None
+                self._check_workers()
+
+    def _lines(self, future: Any) -> list[Line]:
+        """Results of a batch; when a worker is lost with them before they are here, they are made anew."""
+        while True:
+            try:
+                lines: list[Line] = future.result(timeout=_LOOK_S)
+            except TimeoutError:
+                if future.status == "error":  # of a trial
+                    raise
+                self._check_workers()
+            else:
+                return lines
+
+    def _check_workers(self) -> None:
+        """As long as there is a worker its batch is waited for; a local one that was lost is back soon."""
+        try:
+            self._client.wait_for_workers(1, timeout=_LOST_S)
+        except TimeoutError:
+            raise CampaignError("no worker is left; what is done is kept, if there is a file for it") from None
 
 
 def _task() -> Callable[..., list[Line]]:
@@ -141,14 +162,16 @@ def _task() -> Callable[..., list[Line]]:
     return run_there
 
 
-def _result(future: Any) -> list[Line]:
+@contextmanager
+def _explained() -> Iterator[None]:
+    """Say what a person can do about errors of dask; those of a trial stay."""
     from concurrent.futures import CancelledError
 
     from distributed import KilledWorker
     from distributed.comm.core import CommClosedError
 
     try:
-        lines: list[Line] = future.result()
+        yield
     except KilledWorker as error:
         raise CampaignError(
             f"the same trials ended {error.allowed_failures + 1} workers: is there memory for them?"
@@ -159,4 +182,3 @@ def _result(future: Any) -> list[Line]:
         if "gbas_" not in str(error):
             raise
         raise CampaignError(f"a worker has another suite, or none: {error}; install the same there") from None
-    return lines
