@@ -9,6 +9,7 @@ A study says what its trials are, what they share, and what one trial is (:class
 :mod:`~.work`               what a worker does: what trials share is made once in each
 :mod:`~.store`              the file of results: JSON lines that a later run continues
 :mod:`~.executors`          this process, or workers of dask
+:mod:`~.local_worker`       Ctrl-C and local workers
 :mod:`~.running`            all of it
 ==========================  ==================================================================================
 

@@ -72,6 +72,7 @@ def _local_cluster(workers: int) -> Iterator[str]:
         dashboard_address="127.0.0.1:0",
         scheduler_kwargs={"dashboard": False},
         silence_logs=logging.CRITICAL,
+        preload=["gbas_studies.campaign.local_worker"],
     ) as cluster:
         yield cluster.scheduler_address
 
