@@ -277,7 +277,9 @@ def is_kernel(function: ast.FunctionDef | ast.AsyncFunctionDef) -> bool:
     return any(isinstance(each, ast.Name) and each.id == "compiled" for each in names)
 
 
-COMMAND_TYPES = {"Json", "BagPath", "Verbose", "Speed", "SingleProcess", "Domain", "File"}
+COMMAND_TYPES = {
+    "Json", "BagPath", "Verbose", "Speed", "SingleProcess", "Domain", "File", "Workers", "Scheduler", "Results",
+}  # fmt: skip
 """Types with an option of typer that several commands share."""
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 
 import pytest
 from typer.testing import CliRunner
@@ -104,3 +106,35 @@ def test_study_refuses_with_one_line(arguments, word):
     assert result.exit_code == 2
     assert word in json.loads(result.stdout)["error"]
     assert result.stderr.count("\n") == 1
+
+
+def test_campaigns_of_the_command_line(tmp_path):
+    """One gradient study in one process; its file is continued, and refused with another seed."""
+    out = tmp_path / "new" / "gradient.jsonl"
+    study = ("study", "gradient", "--baselines-m", "100,200", "--sigma-m", "0.002", "--trials", "600000", "--json")
+    first = gbas(*study, "--out", str(out))
+    assert first.exit_code == 0, first.output
+    header, *lines = out.read_text(encoding="utf-8").splitlines()
+    assert json.loads(header)["study"] == "gradient"
+    assert [json.loads(line)["trial"] for line in lines] == [0, 1, 2]  # blocks of 250,000
+    detected = sum(json.loads(line)["result"] for line in lines)
+    assert json.loads(first.stdout)["simulated_percent"] == pytest.approx(100.0 * detected / 600_000, rel=1e-12)
+    assert gbas(*study, "--out", str(out)).stdout == first.stdout
+    refused = gbas(*study, "--out", str(out), "--seed", "2")
+    assert refused.exit_code == 2
+    assert "its seed is 1, and that of this campaign 2" in json.loads(refused.stdout)["error"]
+
+
+def test_workers_here_and_a_scheduler_elsewhere_are_one_too_many():
+    result = gbas("study", "faults", "--workers", "2", "--scheduler", "tcp://127.0.0.1:1", "--kind", "power", "--json")
+    assert result.exit_code == 2
+    assert "give one" in json.loads(result.stdout)["error"]
+
+
+def test_dask_is_imported_only_where_it_is_used():
+    """It takes half a second: not for help, nor for a campaign in this process."""
+    code = (
+        "import sys, gbas_cli.main, gbas_cli.study_faults, gbas_studies.campaign, gbas_studies.faults.campaign\n"
+        "sys.exit(any(name in sys.modules for name in ('dask', 'distributed', 'tornado')))"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

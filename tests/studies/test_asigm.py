@@ -173,7 +173,7 @@ def test_sweep_by_hand():
     length_m = 100.0
     period = LAMBDA_M / length_m
     star = Star(lengths_m=(length_m,), sigma_m=0.001)
-    swept = noise.sweep(star, (period, 2.0 * period), 4000, 50_000, np.random.default_rng(1))
+    swept = noise.sweep(star, (period, 2.0 * period), 4000, 50_000, seed=1)
     # A uniform delay with symmetric noise, wrapped, is uniform: outside the threshold with 1 - 2 threshold / lambda.
     expected = 100.0 * (1.0 - 2.0 * star.threshold_m / LAMBDA_M)
     assert swept.detected_percent == pytest.approx(expected, abs=1e-3)

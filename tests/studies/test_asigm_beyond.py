@@ -115,7 +115,8 @@ def test_stated_coverage_holds_in_noise(day, receivers, bands):
     site, params = coverage.site_with(station, receivers, bands)
     params = coverage.replace(params, p_missed_detection=0.05, p_false_alarm=1e-3)
     site = coverage.gradient_site(station.receiver_positions_m()[:receivers], station.reference_point_m(), params)
-    rows = coverage.study(elevation, site, params, coverage.Trials(np.random.default_rng(1), 4))
+    seen = coverage.Day(elevation_rad=elevation, stations={"here": (site, params)}, repetitions=4)
+    rows = coverage.study(seen, seed=1)["here"]
     covered, missed = sum(row.covered for row in rows), sum(row.missed for row in rows)
     assert covered > 200
     assert missed <= 0.05 * covered + 4.0 * np.sqrt(0.05 * covered)
@@ -135,9 +136,8 @@ def test_one_baseline_and_one_reference_against_the_integral(day):
     site = coverage.gradient_site(station.receiver_positions_m()[:2], station.reference_point_m(), params)
     elevation = np.full((1, coverage.N_SATS), np.nan)
     elevation[0, :8] = np.radians([80.0, 30.0, 30.0, 30.0, 30.0, 30.0, 30.0, 30.0])
-    (row,) = coverage.study(
-        elevation, site, params, coverage.Trials(np.random.default_rng(3), 700), bins_deg=(29.0, 31.0)
-    )
+    seen = coverage.Day(elevation_rad=elevation, stations={"here": (site, params)}, repetitions=700)
+    (row,) = coverage.study(seen, seed=3, bins_deg=(29.0, 31.0))["here"]
     sigma = float(np.sqrt(2.0) * np.hypot(*params.noise.sigma_m(np.radians([30.0, 80.0]), (L1,))[0]))
     length_m = abs(float(site.length_m[0, 0]))
     star = Star(lengths_m=(length_m,), sigma_m=sigma, p_false_alarm=float(2.0 * norm.sf(site.k_ffd)))

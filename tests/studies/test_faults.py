@@ -12,8 +12,9 @@ from gbas_core.ranging.smoothing import SmoothingParams, initial_smoothing, smoo
 from gbas_ground.params import GroundParams
 from gbas_sim.faults.kinds import CodeCarrierDivergence, ExcessiveAcceleration
 from gbas_sim.scenario import read_sections, scenario_from_yaml
+from gbas_studies.campaign import Execution
 from gbas_studies.ccd.smoothed_error import Smoothing, StudyError, largest_error_s
-from gbas_studies.faults.campaign import QUIET_S, WORLD_S, run_campaign
+from gbas_studies.faults.campaign import QUIET_S, WORLD_S, Setting, run_campaign
 from gbas_studies.faults.cases import KINDS, cases_of
 from gbas_studies.faults.exposure import TIME_TO_ALERT_S, divergence_limit_s, extrapolation_limit_s
 from gbas_studies.faults.injection import inject, settle
@@ -95,7 +96,8 @@ def test_without_a_fault_nothing_happens(settled):
 
 def test_one_process_and_two_find_the_same(world, station):
     cases = [case for case in cases_of(("acceleration",)) if case.name in ("step 0.5 m", "ramp 0.2 m/s")]
-    one, two = (run_campaign(world, station, cases, trials=1, workers=workers) for workers in (1, 2))
+    setting = Setting(world=world, station=station)
+    one, two = (run_campaign(setting, cases, trials=1, execution=Execution(workers=each)) for each in (1, 2))
     assert [each.as_json() for each in one] == [each.as_json() for each in two]
 
 

@@ -17,7 +17,8 @@ from gbas_cli.study_fronts import Asked, plan_of
 from gbas_core.errors import GbasError
 from gbas_core.satellites import SAT_INDEX
 from gbas_sim.atmosphere.fronts import WedgeFront
-from gbas_studies.fronts.campaign import KINDS, Run, _run_chunk, draw, judge, prepare, run_campaign
+from gbas_studies.campaign import Execution
+from gbas_studies.fronts.campaign import KINDS, Run, draw, judge, prepare, run_campaign, run_trial
 from gbas_studies.fronts.quiet import fly
 from gbas_studies.fronts.response import delay_m, divergence_mps, range_errors, respond, smoothed_m
 
@@ -154,9 +155,15 @@ def test_fronts_drawn_are_within_the_model(stage, kind):
             assert each.gradient <= threat.largest_gradient(elevation) * (1.0 + 1e-12)
 
 
+def meet(stage, runs):
+    """What so many runs do, by station."""
+    found = [run_trial(stage, number, np.random.SeedSequence(stage.plan.seed)) for number in range(runs)]
+    return {name: [each[name] for each in found] for name in stage.plan.stations}
+
+
 def test_a_short_campaign(stage):
     """Fronts up to 425 mm/km: misleading without protection, never with the model they are drawn from."""
-    found = _run_chunk(stage, range(35))
+    found = meet(stage, 35)
     assert sum(each.misleading > 0 for each in found[BARE]) > 10
     assert all(each.misleading == 0 for each in found[CONUS])
 
@@ -165,7 +172,7 @@ def test_a_short_campaign_of_the_declared_model(plan, stage):
     from gbas_ground.ionosphere.threat import THREATS
 
     german = replace(stage, plan=replace(plan, threat=THREATS["germany"]))
-    found = _run_chunk(german, range(70))
+    found = meet(german, 70)
     assert sum(each.misleading > 0 for each in found[BARE]) > 10
     assert all(each.misleading == 0 for each in found[GERMANY])
     assert sum(each.served for each in found[GERMANY]) > 0.95 * sum(each.served for each in found[BARE])
@@ -181,7 +188,7 @@ def test_plans_that_are_none():
 def test_the_campaign_of_the_declared_model():
     """5,600 fronts on the shipped station, GPS alone and with Galileo: no misleading position."""
     for systems in ("G", "GE"):
-        rows = run_campaign(plan_of("quiet_approach", Asked(systems=systems, runs=2_800)), workers=2)
+        rows = run_campaign(plan_of("quiet_approach", Asked(systems=systems, runs=2_800)), Execution(workers=2))
         assert sum(row["runs"] for row in rows if row["station"] == "own") == 2_800
         assert sum(row["misleading_epochs"] for row in rows if row["station"] == "own") == 0
         assert sum(row["misleading_runs"] for row in rows if row["station"] == "none") > 500

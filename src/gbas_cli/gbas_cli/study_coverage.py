@@ -8,12 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gbas_cli.base import Json, print_json
+from gbas_cli.campaign_options import Results, Scheduler, Workers, execution
 from gbas_core.errors import GbasError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from gbas_bringup.progress import Update
     from gbas_studies.asigm.coverage import Bin
 
 
@@ -29,6 +27,9 @@ def coverage(
     step: Annotated[float, typer.Option(metavar="S", help="Between the epochs of the day, in s.")] = 600.0,
     repetitions: Annotated[int, typer.Option(help="Monte Carlo runs of each epoch.", min=1, max=10_000)] = 4,
     seed: Annotated[int, typer.Option(help="Of the Monte Carlo run.", min=0)] = 1,
+    workers: Workers = 1,
+    scheduler: Scheduler = None,
+    out: Results = None,
     as_json: Json = False,
 ) -> None:
     """Coverage of the gradient monitor, satellite by satellite over a day, and what a Monte Carlo run detects.
@@ -37,9 +38,6 @@ def coverage(
     none: share of satellites of which nothing is. detected: share of random gradients that the monitor detected in
     noise. missed: covered gradients that it did not detect; P_md of them is allowed.
     """
-    import numpy as np
-
-    from gbas_bringup.progress import progress
     from gbas_bringup.resources import named_config
     from gbas_core.signals import L1, L5
     from gbas_ground.params import GroundParams
@@ -52,34 +50,28 @@ def coverage(
     station = GroundParams.from_mapping(read_sections(path)["ground"], source=str(path))
     counts = _receivers(receivers, station.n_receivers)
     elevation = studied.elevations_of_a_day(station, scenario_from_yaml(path), step)
-    tables: dict[str, list[Bin]] = {}
-    multipliers: dict[str, list[float]] = {}
-    with progress("injecting", enabled=not as_json) as update:
-        for count in counts:
-            for name, bands in (("L1", (L1,)), ("L1+L5", (L1, L5))):
-                what = f"{count} receivers, {name}"
-                site, params = studied.site_with(station, count, bands)
-                site = studied.papers_multiplier(site) if paper else site
-                multipliers[what] = [each.k_ffd for each in site.tests]
-                tables[what] = studied.study(
-                    elevation, site, params, studied.Trials(np.random.default_rng(seed), repetitions),
-                    progress=_noted(update, what),
-                )  # fmt: skip
+    stations = {}
+    for count in counts:
+        for name, bands in (("L1", (L1,)), ("L1+L5", (L1, L5))):
+            site, params = studied.site_with(station, count, bands)
+            stations[f"{count} receivers, {name}"] = (studied.papers_multiplier(site) if paper else site, params)
+    multipliers = {name: [each.k_ffd for each in site.tests] for name, (site, _) in stations.items()}
+    k_md = site.k_md
+    elevation = studied.elevations_of_a_day(station, scenario_from_yaml(path), step)
+    day = studied.Day(elevation_rad=elevation, stations=stations, repetitions=repetitions)
+    with execution("injecting", workers=workers, scheduler=scheduler, out=out, quiet=as_json) as how:
+        tables = studied.study(day, seed=seed, execution=how)
     if as_json:
         print_json(
             {
                 "tables": {name: [asdict(each) for each in rows] for name, rows in tables.items()},
                 "k_ffd": multipliers,
-                "k_md": site.k_md,
+                "k_md": k_md,
             }
         )
         return
     for name, rows in tables.items():
-        _print(f"{name}; k_ffd {', '.join(f'{k:.2f}' for k in multipliers[name])}, k_md {site.k_md:.2f}", rows)
-
-
-def _noted(update: Update, note: str) -> Callable[[int, int], None]:
-    return lambda done, total: update(done, total, note)
+        _print(f"{name}; k_ffd {', '.join(f'{k:.2f}' for k in multipliers[name])}, k_md {k_md:.2f}", rows)
 
 
 def _receivers(text: str, most: int) -> list[int]:

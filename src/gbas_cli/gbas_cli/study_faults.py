@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
-from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from gbas_cli.base import Json, print_json
+from gbas_cli.campaign_options import Results, Scheduler, Workers, execution
 from gbas_core.errors import GbasError
+
+if TYPE_CHECKING:
+    from gbas_studies.faults.campaign import Setting
 
 
 def register(app: typer.Typer) -> None:
@@ -30,8 +32,9 @@ def faults(
     trials: Annotated[int, typer.Option(help="Of each case, with other satellites and onsets.", min=1)] = 10,
     scenario: Annotated[str, typer.Option(help="World without faults: a .yaml file, or a name.")] = "quiet_approach",
     watch: Annotated[bool, typer.Option("--watch", help="Also every monitor's own time, with none excluding.")] = False,
-    workers: Annotated[int, typer.Option(help="Processes; the result is the same.", min=1, max=64)] = 1,
-    out: Annotated[Path | None, typer.Option(help="File for the results as JSON.")] = None,
+    workers: Workers = 1,
+    scheduler: Scheduler = None,
+    out: Results = None,
     as_json: Json = False,
 ) -> None:
     """Put faults into a simulated station that has settled: found or not, by what, when, and when a burst says so.
@@ -39,21 +42,14 @@ def faults(
     The time to alert counts from the moment the worst user's differential error passes its limit to the end of the
     burst without the satellite; 1.5 s are allowed. Negative: the alert came first.
     """
-    from gbas_bringup.progress import progress
     from gbas_studies.faults import campaign
     from gbas_studies.faults.cases import KINDS, cases_of
 
     cases = cases_of(tuple(kind or KINDS), rates_mps=_rates(rates), modes=tuple(mode or ()))
-    world, station = _world(scenario)
-    with progress("injecting", enabled=not as_json) as update:
-        outcomes = campaign.run_campaign(
-            world, station, cases, trials=trials, watch=watch, workers=workers,
-            progress=lambda done, total: update(done, total, ""),
-        )  # fmt: skip
+    setting = _setting(scenario, watch=watch)
+    with execution("injecting", workers=workers, scheduler=scheduler, out=out, quiet=as_json) as how:
+        outcomes = campaign.run_campaign(setting, cases, trials=trials, execution=how)
     documents = [each.as_json() for each in outcomes]
-    if out is not None:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        out.write_text(json.dumps(documents, indent=1, allow_nan=False) + "\n", encoding="utf-8")
     if as_json:
         print_json({"cases": documents})
     else:
@@ -70,18 +66,19 @@ def _rates(text: str) -> tuple[float, ...]:
     return rates
 
 
-def _world(scenario: str) -> tuple[Any, Any]:
+def _setting(scenario: str, *, watch: bool) -> Setting:
     """The scenario's station alone, for as long as the longest case takes."""
     from dataclasses import replace
 
     from gbas_bringup.resources import named_config
     from gbas_ground.params import GroundParams
     from gbas_sim.scenario import read_sections, scenario_from_yaml
-    from gbas_studies.faults.campaign import WORLD_S
+    from gbas_studies.faults.campaign import WORLD_S, Setting
 
     path = named_config(scenario)
     world = replace(scenario_from_yaml(path), flight=None, duration_s=WORLD_S, faults=(), fronts=())
-    return world, GroundParams.from_mapping(read_sections(path)["ground"], source=str(path))
+    station = GroundParams.from_mapping(read_sections(path)["ground"], source=str(path))
+    return Setting(world=world, station=station, watch=watch)
 
 
 def _print(documents: Sequence[dict[str, Any]]) -> None:

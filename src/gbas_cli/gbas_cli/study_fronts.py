@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from gbas_cli.base import Json, print_json
+from gbas_cli.campaign_options import Results, Scheduler, Workers, execution
 from gbas_core.errors import GbasError
 
 if TYPE_CHECKING:
@@ -41,15 +40,15 @@ def fronts(
     within: Annotated[float, typer.Option(help="Distance to the threshold looked at, in m.", min=100.0)] = 6_000.0,
     seed: Annotated[int, typer.Option(help="Of the fronts.", min=0)] = 1,
     scenario: Annotated[str, typer.Option(help="World without threats: a .yaml file, or a name.")] = "quiet_approach",
-    workers: Annotated[int, typer.Option(help="Processes; the result is the same.", min=1, max=64)] = 1,
-    out: Annotated[Path | None, typer.Option(help="File for the table as JSON.")] = None,
+    workers: Workers = 1,
+    scheduler: Scheduler = None,
+    out: Results = None,
     as_json: Json = False,
 ) -> None:
     """Put fronts of a threat model before a station and its aircraft, and count misleading positions.
 
     A position is misleading when its error exceeds its protection level, with service and without alert.
     """
-    from gbas_bringup.progress import progress
     from gbas_studies.fronts.campaign import KINDS, run_campaign
 
     kinds = tuple(kind or KINDS)
@@ -61,11 +60,8 @@ def fronts(
         seed=seed,
     )  # fmt: skip
     plan = plan_of(scenario, asked)
-    with progress("fronts", enabled=not as_json) as update:
-        rows = run_campaign(plan, workers=workers, progress=lambda done, total: update(done, total, ""))
-    if out is not None:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        out.write_text(json.dumps(rows, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    with execution("fronts", workers=workers, scheduler=scheduler, out=out, quiet=as_json) as how:
+        rows = run_campaign(plan, how)
     if as_json:
         print_json({"rows": rows})
     else:

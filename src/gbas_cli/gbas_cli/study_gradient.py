@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from gbas_cli.base import Json, print_json
+from gbas_cli.campaign_options import Results, Scheduler, Workers, execution
 from gbas_cli.siting import MM_PER_KM, as_many, check, gradients_of, numbers_of
 
 
@@ -25,6 +26,9 @@ def gradient(
     p_false_alarm: Annotated[float, typer.Option(metavar="P", help="Of one baseline.")] = 1e-4,
     trials: Annotated[int, typer.Option(metavar="N", help="Of the Monte Carlo run.")] = 1_000_000,
     seed: Annotated[int, typer.Option(help="Of the Monte Carlo run.", min=0)] = 1,
+    workers: Workers = 1,
+    scheduler: Scheduler = None,
+    out: Results = None,
     as_json: Json = False,
 ) -> None:
     """False alarms and missed detections of the L1 gradient monitor, by an integral and by Monte Carlo.
@@ -43,12 +47,11 @@ def gradient(
     check("--p-false-alarm", p_false_alarm, 0.0 < p_false_alarm < 1.0, "between 0 and 1")
     check("--trials", trials, 1000 <= trials <= 10**9, "1000 to 1000000000")
 
-    import numpy as np
-
     from gbas_studies.asigm.noise import Star, sweep
 
     star = Star(lengths_m=along, sigma_m=sigma_m, p_false_alarm=p_false_alarm)
-    found = sweep(star, (low, high), round(steps), trials, np.random.default_rng(seed))
+    with execution("drawing", workers=workers, scheduler=scheduler, out=out, quiet=as_json) as how:
+        found = sweep(star, (low, high), round(steps), trials, seed, how)
     worst = int(found.missed.argmax())
     if as_json:
         print_json(

@@ -115,9 +115,7 @@ def ground_curve_m(
     theta_deg = _elevation_deg(elevation_rad, mask_rad)
     number = np.asarray(n_receivers, dtype=np.float64)
     number = np.where(number >= 1.0, number, np.nan)
-    return np.asarray(
-        as_written(ground_curve)(curve.a0_m, curve.a1_m, curve.theta0_deg, curve.a2_m, theta_deg, number)
-    )
+    return np.asarray(as_written(ground_curve)(curve.a0_m, curve.a1_m, curve.theta0_deg, curve.a2_m, theta_deg, number))
 
 
 def airborne_curve_m(curve: AirborneCurve, elevation_rad: ArrayLike, *, mask_rad: float = MASK_RAD) -> FloatArray:

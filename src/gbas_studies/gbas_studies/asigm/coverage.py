@@ -12,9 +12,9 @@ count as blind are often detected too, and misses of the gradients that are cove
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -31,6 +31,7 @@ from gbas_ground.monitors.ionosphere_gradient import IonosphereGradientParams, c
 from gbas_ground.params import GroundParams
 from gbas_sim.world import open_orbits
 from gbas_sim.world_params import WorldParams
+from gbas_studies.campaign import Campaign, Execution, run
 
 DAY_S: Final = 86_400.0
 BINS_DEG: Final = (5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 45.0, 60.0, 90.0)
@@ -112,51 +113,106 @@ class _Sky:
     blind: dict[int, FloatArray]
 
 
-class Trials(NamedTuple):
-    """Monte Carlo runs of each epoch.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Day:
+    """Satellites of a day, and the stations that look for gradients on them.
 
-    Each has a random gradient of the monitor's range on every satellite that is nobody's reference, and on one of each
-    constellation's references in turn.
-    """
-
-    random: np.random.Generator
-    repetitions: int = 1
-
-
-def study(
-    elevation_rad: FloatArray,
-    site: GradientSite,
-    params: IonosphereGradientParams,
-    trials: Trials,
-    *,
-    bins_deg: Sequence[float] = BINS_DEG,
-    progress: Callable[[int, int], None] = lambda done, total: None,
-) -> list[Bin]:
-    """Coverage and Monte Carlo of the satellites of a day.
-
-    Parameters
+    Attributes
     ----------
     elevation_rad : (E, N) array
         From :func:`elevations_of_a_day`.
-    site : GradientSite
-    params : IonosphereGradientParams
-    trials : Trials
+    stations : mapping from a name to (GradientSite, IonosphereGradientParams)
+    repetitions : int
+        Monte Carlo runs of each epoch: each has a random gradient of the monitor's range on every satellite that
+        is nobody's reference, and on one of each constellation's references in turn.
+    """
+
+    elevation_rad: FloatArray
+    stations: Mapping[str, tuple[GradientSite, IonosphereGradientParams]]
+    repetitions: int = 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class EpochCounts:
+    """One epoch of the day, satellite by satellite.
+
+    Attributes
+    ----------
+    satellites : tuple of int
+        On the satellite axis; the others of the tuples are theirs.
+    coverage : tuple of float
+        Share of the gradients that is covered.
+    tried, detected, covered, missed, alarms : tuple of int
+        Random gradients; those detected, covered, and covered and not detected; failures without a gradient.
+    """
+
+    satellites: tuple[int, ...]
+    coverage: tuple[float, ...]
+    tried: tuple[int, ...]
+    detected: tuple[int, ...]
+    covered: tuple[int, ...]
+    missed: tuple[int, ...]
+    alarms: tuple[int, ...]
+
+
+def study(
+    day: Day, *, seed: int, bins_deg: Sequence[float] = BINS_DEG, execution: Execution | None = None
+) -> dict[str, list[Bin]]:
+    """Coverage and Monte Carlo of the satellites of a day, for each station.
+
+    Parameters
+    ----------
+    day : Day
+    seed : int
+        Of the Monte Carlo runs.
     bins_deg : sequence of float
         Ends of the bins.
-    progress : callable
-        Told how many of all epochs are done.
+    execution : Execution, optional
+        Where: the tables do not depend on it.
     """
-    counts: list[tuple[FloatArray | BoolArray, ...]] = []
-    for number, row in enumerate(elevation_rad):
-        sky = _sky(row, site, params)
-        for repetition in range(trials.repetitions):
-            counts.append((row, sky.coverage, *_trial(sky, site, params, repetition, trials.random)))
-        progress(number + 1, len(elevation_rad))
-    elevation, coverage, tried, detected, covered, alarms = (np.array(each) for each in zip(*counts, strict=True))
-    return [
-        _bin(low, high, _Tally(np.degrees(elevation), coverage, tried, detected, covered, alarms), trials.repetitions)
-        for low, high in itertools.pairwise(bins_deg)
-    ]
+    epochs = len(day.elevation_rad)
+    campaign = Campaign(
+        study="coverage",
+        settings=day,
+        trials=[(name, number) for name in day.stations for number in range(epochs)],
+        prepare=_as_it_is,
+        run_trial=run_epoch,
+        result=EpochCounts,
+        seed=seed,
+        batch=8,
+    )
+    found = run(campaign, execution)
+    return {
+        name: _bins(day, found[place * epochs : (place + 1) * epochs], bins_deg)
+        for place, name in enumerate(day.stations)
+    }
+
+
+def _as_it_is(day: Day) -> Day:
+    return day
+
+
+def run_epoch(day: Day, trial: tuple[str, int], seed: np.random.SeedSequence) -> EpochCounts:
+    """All Monte Carlo runs of one epoch of the day, by name of the station and number of the epoch."""
+    name, number = trial
+    (site, params), random = day.stations[name], np.random.default_rng(seed)
+    sky = _sky(day.elevation_rad[number], site, params)
+    runs = [_trial(sky, site, params, repetition, random) for repetition in range(day.repetitions)]
+    tried, detected, inside, alarms = (np.array(each) for each in zip(*runs, strict=True))
+    covered = tried & inside
+
+    def counts(happened: BoolArray) -> tuple[int, ...]:
+        return tuple(happened.sum(axis=0)[sky.here].tolist())
+
+    return EpochCounts(
+        satellites=tuple(np.flatnonzero(sky.here).tolist()),
+        coverage=tuple(sky.coverage[sky.here].tolist()),
+        tried=counts(tried),
+        detected=counts(detected),
+        covered=counts(covered),
+        missed=counts(covered & ~detected),
+        alarms=counts(alarms),
+    )
 
 
 def _sky(elevation_rad: FloatArray, site: GradientSite, params: IonosphereGradientParams) -> _Sky:
@@ -220,34 +276,37 @@ def _within(gradient: float, intervals: FloatArray) -> bool:
     return bool(((gradient >= intervals[:, 0]) & (gradient <= intervals[:, 1])).any())
 
 
-class _Tally(NamedTuple):
-    """What came of all trials, ``(trials, N)`` each."""
+def _bins(day: Day, epochs: Sequence[EpochCounts], bins_deg: Sequence[float]) -> list[Bin]:
+    pairs = zip(day.elevation_rad, epochs, strict=True)
+    elevation_deg = np.degrees(np.concatenate([row[list(epoch.satellites)] for row, epoch in pairs]))
 
-    elevation_deg: FloatArray
-    coverage: FloatArray
-    tried: BoolArray
-    detected: BoolArray
-    covered: BoolArray
-    alarms: BoolArray
+    def joined(name: str) -> FloatArray:
+        return np.concatenate([np.array(getattr(epoch, name), dtype=np.float64) for epoch in epochs])
+
+    names = ("coverage", "tried", "detected", "covered", "missed", "alarms")
+    columns = {name: joined(name) for name in names}
+    rows = []
+    for low, high in itertools.pairwise(bins_deg):
+        inside = (elevation_deg >= low) & (elevation_deg < high)
+        rows.append(_bin(low, high, {name: each[inside] for name, each in columns.items()}, day.repetitions))
+    return rows
 
 
-def _bin(low: float, high: float, tally: _Tally, repetitions: int) -> Bin:
-    elevation_deg, coverage, tried, detected, covered, alarms = tally
-    inside = (elevation_deg >= low) & (elevation_deg < high)
-    share = coverage[inside]
+def _bin(low: float, high: float, columns: Mapping[str, FloatArray], repetitions: int) -> Bin:
+    share, tried = columns["coverage"], int(columns["tried"].sum())
     return Bin(
         low_deg=low,
         high_deg=high,
-        samples=int(inside.sum()) // repetitions,
+        samples=share.size,
         unmonitored_percent=100.0 * float((share == 0.0).mean()) if share.size else float("nan"),
         coverage_percent=100.0 * float(share.mean()) if share.size else float("nan"),
         least_percent=100.0 * float(share.min()) if share.size else float("nan"),
-        trials=int(tried[inside].sum()),
-        detected=int(detected[inside].sum()),
-        covered=int(covered[inside].sum()),
-        missed=int((covered & ~detected)[inside].sum()),
-        false_alarms=int(alarms[inside].sum()),
-        quiet=int((inside & ~tried).sum()),
+        trials=tried,
+        detected=int(columns["detected"].sum()),
+        covered=int(columns["covered"].sum()),
+        missed=int(columns["missed"].sum()),
+        false_alarms=int(columns["alarms"].sum()),
+        quiet=share.size * repetitions - tried,
     )
 
 

@@ -32,6 +32,7 @@ from gbas_siting.problem import SitingProblem
 from gbas_siting.search import best_siting
 from gbas_studies.asigm.detectability import WAVELENGTH, K
 from gbas_studies.asigm.testbed import Testbed
+from gbas_studies.campaign import Campaign, Execution, run
 from gbas_studies.reproduction.drawing import LIMIT_COLOUR, new_figure
 from gbas_studies.reproduction.items import Claim, Picture, Section, Value
 
@@ -187,7 +188,7 @@ def noise_section(testbed: Testbed, *, quick: bool, seed: int, progress: Callabl
             f"{_FARTHEST:g} or less agree",
             new=True,
         ),
-        *_bed_items(bed, 100_000 if quick else 1_000_000, random),
+        *_bed_items(bed, 100_000 if quick else 1_000_000, seed),
     ]
     return Section(
         title="The statistic under noise",
@@ -236,37 +237,74 @@ class Sweep:
 
 
 def sweep(
-    star: Star, gradient_range: tuple[float, float], steps: int, n_trials: int, random: np.random.Generator
+    star: Star,
+    gradient_range: tuple[float, float],
+    steps: int,
+    n_trials: int,
+    seed: int,
+    execution: Execution | None = None,
 ) -> Sweep:
-    """Sweep a range of gradients, by the integral and by Monte Carlo."""
+    """Sweep a range of gradients, by the integral and by Monte Carlo.
+
+    Parameters
+    ----------
+    star : Star
+    gradient_range : tuple of float
+        Lowest and highest [m/m].
+    steps : int
+        Of the integral.
+    n_trials, seed : int
+        Of the Monte Carlo run.
+    execution : Execution, optional
+        Where: the result does not depend on it.
+    """
     low, high = gradient_range
     gradients = low + (np.arange(steps) + 0.5) * (high - low) / steps
     missed = silent_probability(star, gradients)
     share = 1.0 - float(missed.mean())
+    campaign = Campaign(
+        study="gradient",
+        settings=RandomGradients(star=star, gradient_range=gradient_range),
+        trials=[min(_CHUNK, n_trials - begin) for begin in range(0, n_trials, _CHUNK)],
+        prepare=_as_they_are,
+        run_trial=count_detected,
+        result=int,
+        seed=seed,
+        batch=16,
+    )
+    detected: list[int] = run(campaign, execution)
     return Sweep(
         gradients=gradients,
         missed=missed,
         p_false_alarm=1.0 - float(silent_probability(star, np.zeros(1))[0]),
         detected_percent=100.0 * share,
-        simulated_percent=100.0 * _detected_share(star, gradient_range, n_trials, random),
+        simulated_percent=100.0 * sum(detected) / n_trials,
         deviation_percent=100.0 * float(np.sqrt(max(share * (1.0 - share), 1.0 / n_trials) / n_trials)),
     )
 
 
-def _detected_share(
-    star: Star, gradient_range: tuple[float, float], n_trials: int, random: np.random.Generator
-) -> float:
-    detected = 0
-    for begin in range(0, n_trials, _CHUNK):
-        size = min(_CHUNK, n_trials - begin)
-        delay_m = random.uniform(*gradient_range, size)[:, np.newaxis] * np.asarray(star.lengths_m)
-        detected += size - int(_silent(star, delay_m, size, random).sum())
-    return detected / n_trials
+@dataclass(frozen=True, kw_only=True)
+class RandomGradients:
+    """Gradients anywhere in a range, before a star."""
+
+    star: Star
+    gradient_range: tuple[float, float]
 
 
-def _bed_items(bed: Star, n_trials: int, random: np.random.Generator) -> list[Value | Claim]:
+def _as_they_are(gradients: RandomGradients) -> RandomGradients:
+    return gradients
+
+
+def count_detected(gradients: RandomGradients, size: int, seed: np.random.SeedSequence) -> int:
+    """How many of so many random gradients with noise are detected."""
+    random, star = np.random.default_rng(seed), gradients.star
+    delay_m = random.uniform(*gradients.gradient_range, size)[:, np.newaxis] * np.asarray(star.lengths_m)
+    return size - int(_silent(star, delay_m, size, random).sum())
+
+
+def _bed_items(bed: Star, n_trials: int, seed: int) -> list[Value | Claim]:
     """How often gradients anywhere in the range are detected at the test bed, against the coverage of the intervals."""
-    swept = sweep(bed, GRADIENT_RANGE, 4000, n_trials, random)
+    swept = sweep(bed, GRADIENT_RANGE, 4000, n_trials, seed)
     detected, expected = swept.simulated_percent, swept.detected_percent
     monitors = [BaselineMonitor(length_m=length, sigma_m=bed.sigma_m) for length in bed.lengths_m]
     coverage = coverage_percent(monitors, K)

@@ -1,25 +1,23 @@
 """Many faults into one settled station: how often and how soon each is found, and by what.
 
-Every case is one kind of fault of one size; its trials differ in satellite, onset within the epoch and seed of the
-noise. Two stations meet the same faults: one that acts, for detection and time to alert, and one whose monitors of
-signals only watch, so that every monitor's own time is seen and none is hidden by a faster one.
+Every case is one kind of fault of one size; its trials differ in satellite and onset, and so in the noise they meet.
+Two stations meet the same faults: one that acts, for detection and time to alert, and one whose monitors of signals
+only watch, so that every monitor's own time is seen and none is hidden by a faster one.
 """
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from multiprocessing import get_context
 from typing import Any, Final
 
 import numpy as np
 
 from gbas_ground.params import GroundParams, watching
 from gbas_sim.world_params import WorldParams
+from gbas_studies.campaign import Campaign, Execution, run
 from gbas_studies.ccd.smoothed_error import StudyError
 from gbas_studies.faults.cases import WATCH_S, Case
 from gbas_studies.faults.exposure import TIME_TO_ALERT_S
@@ -98,98 +96,117 @@ def _spread(values: Sequence[float]) -> dict[str, float | None]:
     return {"min": min(values), "median": float(np.median(values)), "max": max(values)}
 
 
+@dataclass(frozen=True, kw_only=True)
+class Setting:
+    """What all trials share.
+
+    Attributes
+    ----------
+    world : WorldParams
+        Without threats; it must be long enough for the quiet start and the longest case.
+    station : GroundParams
+    watch : bool
+        Also a station whose monitors exclude nothing.
+    """
+
+    world: WorldParams
+    station: GroundParams
+    watch: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trial:
+    """One happening of a case.
+
+    Attributes
+    ----------
+    case : Case
+    number : int
+        Which one of the case's.
+    """
+
+    case: Case
+    number: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reactions:
+    """What a trial did to the stations.
+
+    Attributes
+    ----------
+    acting : Reaction
+    watching : Reaction or None
+        Of the station whose monitors exclude nothing, if there is one.
+    """
+
+    acting: Reaction
+    watching: Reaction | None = None
+
+
 def run_campaign(
-    world: WorldParams,
-    station: GroundParams,
-    cases: Sequence[Case],
-    *,
-    trials: int,
-    watch: bool = False,
-    workers: int = 1,
-    progress: Callable[[int, int], None] = lambda done, total: None,
+    setting: Setting, cases: Sequence[Case], *, trials: int, execution: Execution | None = None
 ) -> list[Outcome]:
     """Let every case happen several times.
 
     Parameters
     ----------
-    world : WorldParams
-        Without threats; it must be long enough for the quiet start and the longest case.
-    station : GroundParams
+    setting : Setting
     cases : sequence of Case
     trials : int
         Of each case.
-    watch : bool
-        Also a station whose monitors exclude nothing.
-    workers : int
-        Processes. The outcome does not depend on how many.
-    progress : callable
-        Told how many of the cases are done.
+    execution : Execution, optional
+        Where: the outcome does not depend on it.
 
     Raises
     ------
     StudyError
         When the world is too short, or the station has no usable satellite after the quiet start.
+    CampaignError
+        See :func:`gbas_studies.campaign.run`.
     """
     longest = max((case.watch_s for case in cases), default=0.0)
-    if world.length_s < QUIET_S + longest + 1.0:
+    if setting.world.length_s < QUIET_S + longest + 1.0:
         needed_s = QUIET_S + longest + 1.0
-        raise StudyError(f"the world is {world.length_s:g} s long, and the longest case needs {needed_s:g} s")
-    if workers == 1:
-        stations = _stations(world, station, watch)
-        results = map(partial(_run_case, stations, trials), cases)
-        return list(_counted(results, len(cases), progress))
-    # A settled station does not travel between processes: each worker settles its own, with the same bits.
-    with ProcessPoolExecutor(
-        workers, mp_context=get_context("spawn"), initializer=_prepare, initargs=(world, station, watch)
-    ) as pool:
-        return list(_counted(pool.map(partial(_run_prepared, trials), cases), len(cases), progress))
+        raise StudyError(f"the world is {setting.world.length_s:g} s long, and the longest case needs {needed_s:g} s")
+    campaign = Campaign(
+        study="faults",
+        settings=setting,
+        trials=[Trial(case=case, number=number) for case in cases for number in range(trials)],
+        prepare=settled_stations,
+        run_trial=run_trial,
+        result=Reactions,
+        seed=setting.world.seed,
+    )
+    reactions = run(campaign, execution)
+    return [_outcome(case, reactions[at * trials : (at + 1) * trials]) for at, case in enumerate(cases)]
 
 
-def _counted(results: Iterable[Outcome], total: int, progress: Callable[[int, int], None]) -> Iterator[Outcome]:
-    for done, outcome in enumerate(results, start=1):
-        progress(done, total)
-        yield outcome
-
-
-def _stations(world: WorldParams, station: GroundParams, watch: bool) -> list[Settled]:
+def settled_stations(setting: Setting) -> list[Settled]:
     """The station that acts and, if wanted, the one that only watches, both settled."""
-    acting = settle(world, station, QUIET_S)
+    acting = settle(setting.world, setting.station, QUIET_S)
     if not acting.usable:
         raise StudyError("the station has no usable satellite after the quiet start")
-    if not watch:
+    if not setting.watch:
         return [acting]
-    return [acting, settle(world, watching(station), QUIET_S)]
+    return [acting, settle(setting.world, watching(setting.station), QUIET_S)]
 
 
-_prepared: list[Settled] = []
-"""The settled stations of a worker process."""
+def run_trial(stations: Sequence[Settled], trial: Trial, seed: np.random.SeedSequence) -> Reactions:
+    """Satellites take turns; onsets are spread over an epoch by the golden ratio. Nothing is drawn with the seed."""
+    acting, case = stations[0], trial.case
+    satellite = acting.usable[trial.number % len(acting.usable)]
+    onset_s = acting.time_s + acting.world.params.interval_s * (1.0 + (trial.number + 1) * 0.6180339887498949 % 1.0)
+    threats = case.threats(satellite, onset_s)
+    found = [inject(each, threats, case.subject or satellite, onset_s, case.watch_s) for each in stations]
+    # a receiver's fault may show on the satellite it is on
+    others = tuple(each for each in found[0].others if each != satellite)
+    return Reactions(acting=replace(found[0], others=others), watching=found[1] if len(found) > 1 else None)
 
 
-def _prepare(world: WorldParams, station: GroundParams, watch: bool) -> None:
-    _prepared[:] = _stations(world, station, watch)
-
-
-def _run_prepared(trials: int, case: Case) -> Outcome:
-    return _run_case(_prepared, trials, case)
-
-
-def _run_case(stations: Sequence[Settled], trials: int, case: Case) -> Outcome:
-    """Satellites take turns; onsets are spread over an epoch by the golden ratio."""
-    acting, reactions, watched = stations[0], [], []
-    interval_s = acting.world.params.interval_s
-    for trial in range(trials):
-        satellite = acting.usable[trial % len(acting.usable)]
-        onset_s = acting.time_s + interval_s * (1.0 + (trial + 1) * 0.6180339887498949 % 1.0)
-        threats = case.threats(satellite, onset_s)
-        subject = case.subject or satellite
-        reaction = inject(acting, threats, subject, onset_s, case.watch_s)
-        # a receiver's fault may show on the satellite it is on
-        reactions.append(replace(reaction, others=tuple(each for each in reaction.others if each != satellite)))
-        watched += [inject(each, threats, subject, onset_s, case.watch_s) for each in stations[1:]]
-    return _outcome(case, reactions, watched)
-
-
-def _outcome(case: Case, reactions: Sequence[Reaction], watched: Sequence[Reaction]) -> Outcome:
+def _outcome(case: Case, trials: Sequence[Reactions]) -> Outcome:
+    reactions = [each.acting for each in trials]
+    watched = [each.watching for each in trials if each.watching is not None]
     found = [each for each in reactions if math.isfinite(each.burst_s)]
     late: list[float] = []
     if math.isfinite(case.limit_s):

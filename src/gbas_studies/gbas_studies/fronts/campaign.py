@@ -9,11 +9,8 @@ rule allows are outside what the station claims, and counted apart.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from multiprocessing import get_context
 from typing import Any, Final
 
 import numpy as np
@@ -25,6 +22,7 @@ from gbas_ground.ionosphere.threat import FrontThreat
 from gbas_ground.params import GroundParams
 from gbas_sim.atmosphere.fronts import WedgeFront
 from gbas_sim.world_params import WorldParams
+from gbas_studies.campaign import Campaign, Execution, run
 from gbas_studies.fronts.quiet import Flight, Observed, fly, observe
 from gbas_studies.fronts.response import RangeErrors, range_errors, respond
 
@@ -32,7 +30,6 @@ WORST_CASE: Final = ("still", "still pair", "with the aircraft", "swept", "swept
 RANDOM: Final = ("random", "random pair")
 KINDS: Final = (*RANDOM, *WORST_CASE)
 _NEAREST_M: Final = 450.0  # the antennas are within this of the station: nearer fronts are over them
-_CHUNK: Final = 50
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -304,64 +301,43 @@ def prepare(plan: Plan) -> Stage:
     return Stage(plan=plan, observed=observed, unprotected=unprotected, flights=flights)
 
 
-def run_campaign(
-    plan: Plan, *, workers: int = 1, progress: Callable[[int, int], None] = lambda done, total: None
-) -> list[dict[str, Any]]:
-    """The table of a campaign: one row a station and kind; the number of workers does not change it."""
-    numbers = range(plan.runs)
-    chunks = [numbers[at : at + _CHUNK] for at in range(0, plan.runs, _CHUNK)]
-    if workers == 1:
-        parts: Iterable[dict[str, list[Outcome]]] = map(partial(_run_chunk, prepare(plan)), chunks)
-        return _table(plan, _counted(parts, len(chunks), progress))
-    with ProcessPoolExecutor(
-        workers, mp_context=get_context("spawn"), initializer=_initialize, initargs=(plan,)
-    ) as pool:
-        return _table(plan, _counted(pool.map(_run_prepared, chunks), len(chunks), progress))
+def run_campaign(plan: Plan, execution: Execution | None = None) -> list[dict[str, Any]]:
+    """The table of a campaign, one row a station and kind; it does not depend on where its trials run."""
+    campaign = Campaign(
+        study="fronts",
+        settings=plan,
+        trials=range(plan.runs),
+        prepare=prepare,
+        run_trial=run_trial,
+        result=dict[str, Outcome],
+        seed=plan.seed,
+        batch=10,
+    )
+    return _table(run(campaign, execution))
 
 
-_prepared: list[Stage] = []
-"""The stage of a worker process."""
+def run_trial(stage: Stage, number: int, seed: np.random.SeedSequence) -> dict[str, Outcome]:
+    """Let one set of fronts meet all stations; kinds take turns.
 
-
-def _initialize(plan: Plan) -> None:
-    _prepared[:] = [prepare(plan)]
-
-
-def _run_prepared(numbers: range) -> dict[str, list[Outcome]]:
-    return _run_chunk(_prepared[0], numbers)
-
-
-def _run_chunk(stage: Stage, numbers: range) -> dict[str, list[Outcome]]:
+    Fronts are drawn with seed and number as the published ones were, not with the trial's own `seed`.
+    """
     plan = stage.plan
-    found: dict[str, list[Outcome]] = {name: [] for name in plan.stations}
-    for number in numbers:
-        kind = plan.kinds[number % len(plan.kinds)]
-        seed = plan.seed * 1_000_000 + number
-        run = draw(
-            kind, stage.observed, stage.unprotected, plan.threat,
-            within_m=plan.within_m, max_missing=plan.max_missing, seed=seed,
-        )  # fmt: skip
-        errors = range_errors(run.fronts, stage.observed, next(iter(plan.stations.values())))
-        for name, station in plan.stations.items():
-            found[name].append(judge(run, errors, stage.observed, stage.flights[name], station, plan.within_m))
-    return found
+    drawn = draw(
+        plan.kinds[number % len(plan.kinds)], stage.observed, stage.unprotected, plan.threat,
+        within_m=plan.within_m, max_missing=plan.max_missing, seed=plan.seed * 1_000_000 + number,
+    )  # fmt: skip
+    errors = range_errors(drawn.fronts, stage.observed, next(iter(plan.stations.values())))
+    return {
+        name: judge(drawn, errors, stage.observed, stage.flights[name], station, plan.within_m)
+        for name, station in plan.stations.items()
+    }
 
 
-def _counted(parts: Iterable[Any], total: int, progress: Callable[[int, int], None]) -> Iterator[Any]:
-    for done, part in enumerate(parts, start=1):
-        progress(done, total)
-        yield part
-
-
-def _table(plan: Plan, parts: Iterable[dict[str, list[Outcome]]]) -> list[dict[str, Any]]:
-    all_of: dict[str, list[Outcome]] = {name: [] for name in plan.stations}
-    for part in parts:
-        for name, outcomes in part.items():
-            all_of[name] += outcomes
+def _table(found: Sequence[dict[str, Outcome]]) -> list[dict[str, Any]]:
     return [
-        row_of(name, kind, [each for each in outcomes if each.kind == kind])
-        for name, outcomes in all_of.items()
-        for kind in dict.fromkeys(each.kind for each in outcomes)
+        row_of(name, kind, [each[name] for each in found if each[name].kind == kind])
+        for name in found[0]
+        for kind in dict.fromkeys(each[name].kind for each in found)
     ]
 
 

@@ -238,7 +238,7 @@ def on_axis(values: FloatArray, state: FloatArray, n_rows: int) -> FloatArray:
 def by_receiver(
     b_m: FloatArray, used: BoolArray, state: FloatArray, cause: FloatArray, n_products: int, n_rows: int
 ) -> tuple[FloatArray, FloatArray]:
-    """B values ``(tau, R, N)`` of usable satellites, and 1 where a channel is used, each ``(n_products, n_rows, N)``."""
+    """B values ``(tau, R, N)`` of usable satellites, and 1 where a channel is used: ``(n_products, n_rows, N)``."""
     values = np.full((n_products, n_rows, len(state)), np.nan)
     flags = np.full((n_products, n_rows, len(state)), np.nan)
     for t in range(b_m.shape[0]):
