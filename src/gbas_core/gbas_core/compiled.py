@@ -1,20 +1,126 @@
-"""Compiled functions: loops over single numbers that numpy would be slow at."""
+"""Compiled functions: loops over single numbers that numpy would be slow at.
+
+What is compiled is kept beside its module (or, where that cannot be written, in the user's cache) for the next process.
+A cache that cannot be read or written costs time and nothing else.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, TypeVar, cast
+import hashlib
+import types
+import warnings
+from collections.abc import Callable, Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any, Final, TypeVar, cast
 
+import numpy as np
 from numba import njit
+from numba.core.caching import FunctionCache
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
+
+_dispatchers: Final[list[Any]] = []
 
 
 def compiled(function: _Function) -> _Function:
     """The function compiled, once a machine. No ``fastmath``: the order of sums and the meaning of NaN stay."""
-    return cast(_Function, njit(cache=True, error_model="numpy")(function))
+    dispatcher = njit(error_model="numpy")(function)
+    try:
+        dispatcher._cache = _Kept(function, stamp_of(function))
+    except (OSError, RuntimeError):  # numba's word for no folder that can be written
+        _note_once("nowhere", "no folder for compiled functions can be written, so every process compiles them anew")
+    _dispatchers.append(dispatcher)
+    return cast(_Function, dispatcher)
 
 
 def as_written(function: _Function) -> _Function:
     """The Python of a compiled function: a formula of single numbers is one of arrays too."""
     return cast(_Function, getattr(function, "py_func", function))
+
+
+def load_ahead() -> int:
+    """Load all that is kept of the functions known by now, so that no first call waits; how many of their forms."""
+    return sum(each._cache.load_all(each) for each in _dispatchers if isinstance(each._cache, _Kept))
+
+
+class _Kept(FunctionCache):  # type: ignore[misc]
+    """A function's cache that is valid for what the function calls, too, and never ends a program."""
+
+    def __init__(self, function: Callable[..., Any], stamp: bytes) -> None:
+        super().__init__(function)
+        self.stamp = self._cache_file._source_stamp = stamp
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        try:
+            return super().load_overload(sig, target_context)
+        except Exception as error:
+            _note_once(
+                "read", f"compiled functions in {self.cache_path} cannot be read and are compiled anew: {error!r}"
+            )
+            Path(self._cache_file._index_path).unlink(missing_ok=True)
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        try:
+            super().save_overload(sig, data)
+        except Exception as error:
+            _note_once("write", f"compiled functions cannot be kept in {self.cache_path}: {error!r}")
+
+    def load_all(self, dispatcher: Any) -> int:
+        """Load every form there is for this machine."""
+        try:
+            kept = list(self._cache_file._load_index())
+        except Exception:
+            return 0  # the first call will say so
+        codegen = dispatcher.targetctx.codegen()
+        forms = [form for form, *rest in kept if (form, *rest) == self._index_key(form, codegen)]
+        for form in forms:
+            dispatcher.compile(form)
+        return len(forms)
+
+
+_noted: Final[set[str]] = set()
+
+
+def _note_once(kind: str, text: str) -> None:
+    if kind not in _noted:
+        _noted.add(kind)
+        warnings.warn(text, RuntimeWarning, stacklevel=4)
+
+
+def stamp_of(function: Callable[..., Any]) -> bytes:
+    """Digest of the function's module and of all from elsewhere that is compiled into it: functions and constants."""
+    digest = hashlib.sha256(_source(function.__code__.co_filename))
+    for name, value in _outside(function):
+        inner = getattr(value, "_cache", None)
+        if isinstance(inner, _Kept):
+            digest.update(inner.stamp)
+        elif isinstance(value, np.ndarray):
+            digest.update(name.encode() + str((value.dtype, value.shape)).encode() + value.tobytes())
+        elif isinstance(value, int | float | complex | str | bytes | tuple):
+            digest.update(f"{name}={value!r}".encode())
+    return digest.digest()
+
+
+def _outside(function: Callable[..., Any]) -> Iterator[tuple[str, Any]]:
+    """Global names the function uses, in order, with their values; of a module, what it uses of it."""
+    used = {name for code in _codes(function.__code__) for name in code.co_names}
+    for name in sorted(used & function.__globals__.keys()):
+        value = function.__globals__[name]
+        if isinstance(value, types.ModuleType):
+            yield from ((f"{name}.{each}", getattr(value, each)) for each in sorted(used & vars(value).keys()))
+        else:
+            yield name, value
+
+
+def _codes(code: types.CodeType) -> Iterator[types.CodeType]:
+    yield code
+    for each in code.co_consts:
+        if isinstance(each, types.CodeType):
+            yield from _codes(each)
+
+
+@cache
+def _source(path: str) -> bytes:
+    return Path(path).read_bytes()
