@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 from typing import Final
 
 from gbas_airborne.params import AirborneParams
@@ -21,6 +22,7 @@ PRODUCT_OF_MEASUREMENT: Final = {
 """Name of the product a type 1 message carries, by its measurement type."""
 
 
+@lru_cache(maxsize=8)
 def configured_modes(params: AirborneParams) -> tuple[Mode, ...]:
     """The modes that run: those of the service asked for. The first is the one guidance is from.
 
