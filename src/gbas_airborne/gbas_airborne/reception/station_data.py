@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from gbas_airborne.reception.columns import B_VALUES, IOD, PRC, RRC, SIGMA
+from gbas_airborne.reception.columns import B_VALUES, IOD, LISTED, PRC, RRC, SIGMA
 from gbas_core.gnss.frames import ecef_from_geodetic
 from gbas_core.positioning.approach import FinalApproach
 from gbas_core.record import FloatArray
@@ -60,6 +60,11 @@ class Corrections:
     received: tuple[int, float]
     columns: FloatArray
     """``(rows, N_SATS)``: listed, issue of data, PRC [m], RRC [m/s], sigma [m], and a B value [m] for each receiver."""
+
+    @property
+    def listed(self) -> FloatArray:
+        """1 where there is a correction."""
+        return self._row(LISTED)
 
     @property
     def iod(self) -> FloatArray:
