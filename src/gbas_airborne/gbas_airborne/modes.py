@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 from typing import Final
 
 from gbas_airborne.params import AirborneParams
@@ -31,11 +32,15 @@ def configured_modes(params: AirborneParams) -> tuple[Mode, ...]:
     ValueError
         When the table has no mode for that service.
     """
-    service = ServiceType[params.service]
-    chosen = [mode for mode in modes.MODES if mode.service == service]
+    return _modes_of(modes.MODES, params.service, params.smoothing_tau_s)
+
+
+@lru_cache(maxsize=8)
+def _modes_of(table: tuple[Mode, ...], service: str, smoothing_tau_s: float) -> tuple[Mode, ...]:
+    chosen = [mode for mode in table if mode.service == ServiceType[service]]
     if not chosen:
-        raise ValueError(f"service {params.service}: no mode gives it")
-    return replace(chosen[0], smoothing_s=params.smoothing_tau_s), *chosen[1:]
+        raise ValueError(f"service {service}: no mode gives it")
+    return replace(chosen[0], smoothing_s=smoothing_tau_s), *chosen[1:]
 
 
 def subject_prefix(number: float, params: AirborneParams) -> str:

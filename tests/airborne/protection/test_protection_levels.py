@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import protection_loops
-from gbas_airborne.protection.levels import Multipliers, h1_levels, protection_levels
+from gbas_airborne.protection.kernels.levels import h1_level_m
+from gbas_airborne.protection.levels import Multipliers, protection_levels
 from gbas_core.models.missed_detection import k_ffmd, k_md
 from gbas_core.positioning.wls import projection_matrix, vertical_lateral
 from gbas_core.satellites import N_SATS, missing
@@ -226,7 +227,7 @@ def test_a_faulted_receiver_is_covered_as_often_as_said(m: int) -> None:
         b_m = missing(4)
         b_m[:m, :n] = correction - (noise.sum(axis=0) - noise) / (m - 1)
         only_first = np.where(np.arange(4)[:, None] == 0, b_m, b_m * 0.0)
-        level = h1_levels(s, only_first, gnd2, other2, k)[0]
+        level = h1_level_m(s[0], only_first, gnd2, other2, k)
         error = abs(s[0, :n] @ (correction + rng.normal(size=n) * 0.3))
         count += int(error > level)
     assert within(count, trials, missed)

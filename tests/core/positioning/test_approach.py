@@ -12,7 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gbas_core.gnss.frames import ecef_from_geodetic
-from gbas_core.positioning.approach import APD_AB, FOOT_M, FinalApproach, alert_limits
+from gbas_core.positioning.approach import APD_AB, FinalApproach, alert_limits
+from gbas_core.positioning.kernels.approach import FOOT_M
 
 TABLE = yaml.safe_load((Path(__file__).parents[2] / "tables" / "alert_limits.yaml").read_text(encoding="utf-8"))
 GPA_RAD = math.radians(3.0)

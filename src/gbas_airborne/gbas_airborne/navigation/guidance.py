@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-call"
 """Guidance: where the aircraft is on the approach, whether that is within coverage, and the alert limits there.
 
 Source: ICAO Annex 10 vol. I, tables B-68 and B-69 (alert limits) and 3.7.3.5.3 (service volume); RTCA DO-253
@@ -11,7 +12,8 @@ from typing import Final
 
 import numpy as np
 
-from gbas_core.positioning.approach import APD_AB, ApproachDeviation, FinalApproach, alert_limits
+from gbas_core.positioning.approach import APD_AB, ApproachDeviation, FinalApproach
+from gbas_core.positioning.kernels.approach import alert_limits
 from gbas_core.record import FloatArray
 from gbas_msgs_py.records import SolutionEpoch
 
@@ -94,7 +96,8 @@ def alert_limits_m(solution: SolutionEpoch) -> tuple[float, float]:
     path_height_m = solution.height_above_ltp_m - solution.vertical_m
     if not math.isfinite(distance_m + path_height_m):
         distance_m = path_height_m = np.inf
-    val_m, lal_m = alert_limits(
-        solution.fasval_m, solution.faslal_m, distance_m, path_height_m, constant=solution.apd == APD_AB
-    )
-    return float(val_m), float(lal_m)
+    limits_m: tuple[float, float] = alert_limits(
+        float(solution.fasval_m), float(solution.faslal_m), float(distance_m), float(path_height_m),
+        bool(solution.apd == APD_AB),
+    )  # fmt: skip
+    return limits_m

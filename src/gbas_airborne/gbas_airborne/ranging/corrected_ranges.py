@@ -104,7 +104,7 @@ def correct(
     station, sets = received.station, received.corrections
     served = station is not None and (station.healthy or params.use_unhealthy)
     products = tuple(dict.fromkeys(mode.product for mode in modes if served and mode.product in sets))
-    matched = {name: _match(state.matched.get(name, OwnEphemerides()), name, received) for name in products}
+    matched = {name: _match(state.matched.get(name), name, received) for name in products}
     ranges = {mode.number: tracked.ranges(mode) for mode in modes}
     corrected = [mode for mode in modes if mode.product in products]
     sources = {mode.number: _without_station(mode, ranges[mode.number]) for mode in modes if mode not in corrected}
@@ -114,10 +114,11 @@ def correct(
     return CorrectState(matched={**state.matched, **matched}), Corrected(received=received, sources=found)
 
 
-def _match(before: OwnEphemerides, product: str, received: Received) -> OwnEphemerides:
+def _match(before: OwnEphemerides | None, product: str, received: Received) -> OwnEphemerides:
     """Own ephemerides with an issue of data, and their CRCs; one that is as before has its CRC already."""
     iod = received.corrections[product].iod
     ephemeris = received.ephemerides.matching(iod, received.gps_week, received.tow_s)
+    before = before or OwnEphemerides()
     if ephemeris is before.ephemeris:
         return before
     found = np.isfinite(ephemeris.iod)

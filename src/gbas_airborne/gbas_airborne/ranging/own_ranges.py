@@ -11,6 +11,7 @@ import numpy as np
 from gbas_airborne.modes import band_of
 from gbas_airborne.params import AirborneParams
 from gbas_airborne.reception.receive import Received
+from gbas_core.gnss.observations import LARGEST_OBSERVATION
 from gbas_core.ranging.channel_filter import (
     ChannelFilterParams,
     ChannelFilterState,
@@ -26,6 +27,7 @@ from gbas_msgs_py.modes import Mode
 
 # A pseudorange is some 2e7 m, and a receiver clock is not three seconds off: anything larger is no measurement.
 LARGEST_CODE_M: Final = 1e9
+_LARGEST: Final = np.array([LARGEST_CODE_M, *[LARGEST_OBSERVATION] * 3])[:, np.newaxis, np.newaxis]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -90,13 +92,9 @@ def track(
     observations = received.observations
     assert observations is not None
     filters = filter_params(modes, params)
-    code_m = sensible(observations.code_m, LARGEST_CODE_M)
-    observed = ChannelObservations(
-        code_m[np.newaxis],
-        sensible(observations.carrier_m)[np.newaxis],
-        sensible(observations.doppler_hz)[np.newaxis],
-        sensible(observations.lli)[np.newaxis],
-    )
+    given = observations.code_m, observations.carrier_m, observations.doppler_hz, observations.lli
+    code_m, carrier_m, doppler_hz, lli = sensible(np.array(given), _LARGEST)[:, np.newaxis]
+    observed = ChannelObservations(code_m, carrier_m, doppler_hz, lli)
     state = initial_channel_filter(filters) if state is None else state
     state, channels = channel_filter_step(state, observed, received.epoch_ms, filters)
-    return state, Tracked(received=received, code_m=code_m, channels=channels, tau_s=filters.smoothing.tau_s)
+    return state, Tracked(received=received, code_m=code_m[0], channels=channels, tau_s=filters.smoothing.tau_s)

@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from gbas_airborne.reception.columns import B_VALUES, IOD, SIGMA
+from gbas_airborne.reception.columns import B_VALUES, IOD, LISTED, PRC, RRC, SIGMA
 from gbas_core.gnss.frames import ecef_from_geodetic
 from gbas_core.positioning.approach import FinalApproach
 from gbas_core.record import FloatArray
@@ -62,10 +62,33 @@ class Corrections:
     """``(rows, N_SATS)``: listed, issue of data, PRC [m], RRC [m/s], sigma [m], and a B value [m] for each receiver."""
 
     @property
+    def listed(self) -> FloatArray:
+        """1 where there is a correction."""
+        return self._row(LISTED)
+
+    @property
     def iod(self) -> FloatArray:
         """Issues of data of the corrections' ephemerides."""
-        iod: FloatArray = self.columns[IOD]
-        return iod
+        return self._row(IOD)
+
+    @property
+    def prc_m(self) -> FloatArray:
+        """PRC [m]."""
+        return self._row(PRC)
+
+    @property
+    def rrc_mps(self) -> FloatArray:
+        """RRC [m/s]."""
+        return self._row(RRC)
+
+    @property
+    def sigma_m(self) -> FloatArray:
+        """Sigmas of the corrections [m]."""
+        return self._row(SIGMA)
+
+    def _row(self, place: int) -> FloatArray:
+        row: FloatArray = self.columns[place]
+        return row
 
     @property
     def b_m(self) -> FloatArray:

@@ -10,7 +10,7 @@ Source: ICAO Annex 10 vol. I, App. B 3.6.4 and 3.6.5; RTCA DO-253 2.3.6 to 2.3.8
 from __future__ import annotations
 
 import math
-from dataclasses import fields, replace
+from types import SimpleNamespace
 from typing import Final
 
 from gbas_airborne.modes import PRODUCT_OF_MEASUREMENT
@@ -71,7 +71,8 @@ def reception_step(
         else:
             waiting.append(burst)
     ready.sort(key=lambda burst: (epoch_key(burst.gps_week, burst.tow_s), burst.slot))
-    intake = _VdbMessageProcessor(replace(state, waiting=tuple(waiting)), gps_week, tow_s, params)
+    intake = _VdbMessageProcessor(state, gps_week, tow_s, params)
+    intake.state.waiting = tuple(waiting)
     intake.count(failed=malformed)
     for burst in ready:
         intake.take(burst)
@@ -80,17 +81,17 @@ def reception_step(
 
 
 class _VdbMessageProcessor:
-    """Works through the bursts of one epoch; the state it hands back is frozen as ever."""
+    """Works through the bursts of one epoch, on a state in work; the one it hands back is frozen as ever."""
 
     def __init__(self, state: ReceptionState, gps_week: int, tow_s: float, params: AirborneParams) -> None:
-        self.state = state
+        self.state = SimpleNamespace(**vars(state))
         self.params = params
         self.events = EventLog(gps_week, tow_s, SOURCE)
         self._epoch = (gps_week, tow_s)
-        self._counts = {item.name: getattr(state.counts, item.name) for item in fields(Counts)}
+        self._counts = dict(vars(state.counts))
 
     def finished(self) -> ReceptionState:
-        return replace(self.state, counts=Counts(**self._counts))
+        return ReceptionState(**{**vars(self.state), "counts": Counts(**self._counts)})
 
     def count(self, **increments: int) -> None:
         for name, increment in increments.items():
@@ -105,7 +106,8 @@ class _VdbMessageProcessor:
         age_s = self._age_of(self.state.type4_received)
         if age_s > limit_s:
             self.events.add(EventKind.STATION, f"rpds{self.params.rpds}", "approach_timeout", age_s, limit_s)
-            self.state = replace(self.state, approach=None, type4_received=None)
+            self.state.approach = None
+            self.state.type4_received = None
 
     def _age_of(self, received: tuple[int, float] | None) -> float:
         return math.nan if received is None else seconds_between(*received, *self._epoch)
@@ -151,7 +153,7 @@ class _VdbMessageProcessor:
             self._take_type11(message, burst)
         heard = (burst.gps_week, burst.tow_s)
         if self.state.station_id == block.station_id and self.state.heard != heard:
-            self.state = replace(self.state, heard=heard)
+            self.state.heard = heard
 
     # --- whose message, and may it be used
 
@@ -187,7 +189,8 @@ class _VdbMessageProcessor:
 
     def _forget(self, cause: str, value: float = math.nan, threshold: float = math.nan) -> None:
         self.events.add(EventKind.STATION, self.state.station_id or "", cause, value, threshold)
-        self.state = ReceptionState(waiting=self.state.waiting, counts=self.state.counts)
+        nothing = ReceptionState(waiting=self.state.waiting, counts=self.state.counts)
+        self.state = SimpleNamespace(**vars(nothing))
 
     # --- messages
 
@@ -197,7 +200,7 @@ class _VdbMessageProcessor:
             self._forget("station_changed")
         received = (burst.gps_week, burst.tow_s)
         if known == station_id and message == self.state.type2:
-            self.state = replace(self.state, type2_received=received)
+            self.state.type2_received = received
             return
         station = station_data(message)
         old = self.state.station
@@ -208,7 +211,10 @@ class _VdbMessageProcessor:
             self.events.add(EventKind.STATION, station_id, "station_selected", float(station.gcid))
         elif old.gcid != station.gcid:
             self.events.add(EventKind.STATION, station_id, "gcid_changed", float(station.gcid), float(old.gcid))
-        self.state = replace(self.state, station_id=station_id, station=station, type2=message, type2_received=received)
+        self.state.station_id = station_id
+        self.state.station = station
+        self.state.type2 = message
+        self.state.type2_received = received
 
     def _take_type1(self, message: Type1, burst: Burst) -> None:
         if message.measurement_type not in PRODUCT_OF_MEASUREMENT:
@@ -224,24 +230,28 @@ class _VdbMessageProcessor:
         # Both are sent in one frame. The Z-count alone does not tell: it is the same again after 20 minutes.
         matches = self.state.pending_frame == frame and sorted(flags) == [1, 3]
         if pending and matches and _same_set(pending, message):
-            self.state = replace(self.state, pending_pair=None, pending_frame=None)
+            self.state.pending_pair = None
+            self.state.pending_frame = None
             self._take_corrections(message, pending.measurements + message.measurements, burst)
             return
         self._drop_pending()
-        self.state = replace(self.state, pending_pair=message, pending_frame=frame)
+        self.state.pending_pair = message
+        self.state.pending_frame = frame
 
     def _take_type11(self, message: Type11, burst: Burst) -> None:
         """The 30 s corrections of one frame: a message, or a linked pair."""
         frame = (burst.gps_week, burst.tow_s)
         kept = self.state.type11[-1:] if self.state.type11_frame == frame else ()
         kept = tuple(m for m in kept if m.modified_z_count_s == message.modified_z_count_s)
-        self.state = replace(self.state, type11=(*kept, message), type11_frame=frame)
+        self.state.type11 = (*kept, message)
+        self.state.type11_frame = frame
 
     def _drop_pending(self) -> None:
         """Half of a linked pair whose other half did not come is never used."""
         if self.state.pending_pair is not None:
             self.count(unpaired=1)
-            self.state = replace(self.state, pending_pair=None, pending_frame=None)
+            self.state.pending_pair = None
+            self.state.pending_frame = None
 
     def _take_ephemeris_check(self, message: Type1) -> None:
         if not message.measurements or message.ephemeris_crc is None:
@@ -255,7 +265,7 @@ class _VdbMessageProcessor:
         if told != (checks.iod[index], checks.crc[index], checks.p[index]):
             columns = checks.columns.copy()
             columns[:, index] = told
-            self.state = replace(self.state, checks=EphemerisChecks(columns=columns))
+            self.state.checks = EphemerisChecks(columns=columns)
 
     def _take_corrections(self, message: Type1, measurements: tuple[Correction100, ...], burst: Burst) -> None:
         """A complete set of corrections of the message's product."""
@@ -274,7 +284,7 @@ class _VdbMessageProcessor:
             self.events.add(EventKind.INPUT, "type1", "z_count", age_s, self.params.correction_timeout_s)
             return
         corrections = correction_set((week, tow_s), (burst.gps_week, burst.tow_s), measurements)
-        self.state = replace(self.state, corrections={**self.state.corrections, product: corrections})
+        self.state.corrections = {**self.state.corrections, product: corrections}
 
     def _take_type4(self, message: Type4, burst: Burst) -> None:
         if self.params.rpds == NO_FAS:
@@ -289,7 +299,8 @@ class _VdbMessageProcessor:
                 elif not same_approach(approach, self.state.approach):
                     self.events.add(EventKind.STATION, subject, "approach_received", float(self.params.rpds))
                 received = (burst.gps_week, burst.tow_s) if approach is not None else None
-                self.state = replace(self.state, approach=approach, type4_received=received)
+                self.state.approach = approach
+                self.state.type4_received = received
 
     def _approach(self, data_set: FasDataSet) -> tuple[FinalApproach | None, str]:
         """The approach of a FAS data set, or None and why not."""

@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-call"
 """The final approach: its frame, deviations from its path, and alert limits.
 
 The approach frame has its origin at the landing threshold point (LTP), x forward along the final course in the plane
@@ -21,24 +22,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gbas_core.gnss.frames import ecef_from_geodetic, geodetic_from_ecef, rot_enu_ecef
+from gbas_core.positioning.kernels import approach as kernel
 from gbas_core.record import FloatArray
 
 # Known: distance of the GNSS azimuth reference point behind the FPAP, the course width of a FAS without runway.
 GARP_BEYOND_FPAP_M: Final = 305.0
 POINT_IN_SPACE_COURSE_WIDTH_M: Final = 38.0
-# Known: full scale of the deviations, in difference of depth of modulation and as a share of the glide path angle.
-LATERAL_FULL_SCALE_DDM: Final = 0.155
-VERTICAL_FULL_SCALE_DDM: Final = 0.175
-VERTICAL_FULL_SCALE_OF_GPA: Final = 0.25
 # Known: offset of the elevation reference point (GERP) from the GPIP, at a right angle to the course.
 GERP_OFFSET_M: Final = 150.0
-
-FOOT_M: Final = 0.3048
-# Known (Annex 10, tables B-68 and B-69): where the alert limits begin and stop growing.
-LAL_NEAR_M: Final = 873.0
-LAL_FAR_M: Final = 7500.0
-VAL_LOW_FT: Final = 200.0
-VAL_HIGH_FT: Final = 1340.0
 
 # Known: approach performance designator of the FAS data block.
 APD_AB: Final = 0
@@ -66,7 +57,7 @@ _BOUNDS: Final[dict[str, tuple[float, float]]] = {
 _MAY_BE_MISSING: Final = frozenset({"delta_length_offset_m", "fasval_m", "faslal_m"})
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class ApproachDeviation:
     """Where positions are relative to a final approach; arrays (...).
 
@@ -277,22 +268,12 @@ class FinalApproach:
 
         Source: RTCA DO-253 2.3.11; full scales as in ICAO Annex 10 Vol. I, App. B 3.6.4.5.
         """
-        position = self.approach_from_ecef(position_ecef_m)
-        x, y, z = position[..., 0], position[..., 1], position[..., 2]
-        path_height_m = self.path_height_m(-x)
-        to_garp_m = np.where(x < self.garp_m[0], self.garp_m[0] - x, np.nan)
-        lateral_rad = np.arctan(y / to_garp_m)
-        to_gerp_m = np.where(x < self.gerp_m[0], np.hypot(x - self.gerp_m[0], y - self.gerp_m[1]), np.nan)
-        vertical_rad = np.arctan2(z - self.gerp_m[2], to_gerp_m) - self.gpa_rad
-        return ApproachDeviation(
-            distance_m=-x,
-            height_m=z,
-            path_height_m=path_height_m,
-            lateral_m=y,
-            vertical_m=z - path_height_m,
-            lateral_ddm=LATERAL_FULL_SCALE_DDM * lateral_rad / self.lateral_full_scale_rad,
-            vertical_ddm=VERTICAL_FULL_SCALE_DDM * vertical_rad / (VERTICAL_FULL_SCALE_OF_GPA * self.gpa_rad),
-        )
+        position_m = self.approach_from_ecef(position_ecef_m)
+        fields = kernel.deviations(
+            np.ascontiguousarray(position_m).reshape(-1, 3), float(self.tch_m), float(self.gpa_rad), self.garp_m,
+            self.gerp_m, self.lateral_full_scale_rad,
+        )  # fmt: skip
+        return ApproachDeviation(*fields.reshape(7, *position_m.shape[:-1]))
 
     @cached_property
     def lateral_full_scale_rad(self) -> float:
@@ -339,15 +320,8 @@ def alert_limits(
 
     Source: ICAO Annex 10 Vol. I, App. B tables B-68 and B-69.
     """
-    fasval, faslal, distance, height = (
-        np.asarray(value, dtype=np.float64) for value in (fasval_m, faslal_m, distance_m, height_m)
-    )
-    known = np.where(np.isnan(distance), np.nan, 0.0), np.where(np.isnan(height), np.nan, 0.0)
-    if constant:
-        return fasval + known[1], faslal + known[0]
-    height_ft = height / FOOT_M
-    lateral = np.where(distance > LAL_NEAR_M, 0.0044 * np.minimum(distance, LAL_FAR_M) - 3.85, 0.0)
-    lateral = np.where(distance > LAL_FAR_M, 29.15, lateral)
-    vertical = np.where(height_ft > VAL_LOW_FT, 0.02925 * np.minimum(height_ft, VAL_HIGH_FT) - 5.85, 0.0)
-    vertical = np.where(height_ft > VAL_HIGH_FT, 33.35, vertical)
-    return fasval + vertical + known[1], faslal + lateral + known[0]
+    given = np.broadcast_arrays(*(np.asarray(each, np.float64) for each in (fasval_m, faslal_m, distance_m, height_m)))
+    fasval, faslal, distance, height = (np.array(each).ravel() for each in given)
+    limits_m = kernel.all_alert_limits(fasval, faslal, distance, height, bool(constant))
+    val_m, lal_m = limits_m.reshape(2, *given[0].shape)
+    return np.asarray(val_m), np.asarray(lal_m)

@@ -145,6 +145,6 @@ def channel_filter_step(
     return ChannelFilterState(last_ms=epoch_ms, slips=slips, smoothing=smoothing), filtered
 
 
-def sensible(values: FloatArray, largest: float = LARGEST_OBSERVATION) -> FloatArray:
+def sensible(values: FloatArray, largest: FloatArray | float = LARGEST_OBSERVATION) -> FloatArray:
     """The values with what is no measurement (infinite, or larger than any can be) missing."""
     return np.where(np.abs(values) <= largest, values, np.nan)

@@ -228,11 +228,13 @@ def slip_step(
     """
     code_m, carrier_m, doppler_hz, lli = map(np.ascontiguousarray, observed[:4])
     range_m, dt_s = np.ascontiguousarray(observed.known_m), float(dt_s)
-    cause, slipped, carrier_m, rate_mps, acceleration_mps2, followed_m, clock_step_m = find_slips(
+    cause, slipped, moving, steps_m = find_slips(
         code_m, carrier_m, doppler_hz, lli, range_m,
         state.code_m, state.carrier_m, state.doppler_hz, state.rate_mps, state.acceleration_mps2, state.range_m,
         state.followed_m, state.dt_s, dt_s, thresholds(params, dt_s),
     )  # fmt: skip
+    carrier_m, rate_mps, acceleration_mps2 = moving
+    followed_m, clock_step_m = steps_m
     new = SlipState(
         code_m=code_m,
         carrier_m=carrier_m,

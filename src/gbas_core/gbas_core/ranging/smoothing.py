@@ -180,10 +180,11 @@ def smooth_bands(
     bands : (bands,) int array
         Their places on the band axis of the observations.
     """
-    smoothed_m, last_m, count, elapsed_s = smooth(
+    smoothed_m, memory = smooth(
         code_m, carrier_m, slipped, bands, state.smoothed_m, state.carrier_m, state.count, state.elapsed_s,
         float(dt_s), float(params.max_gap_s), params.tau_array_s, params.start_number,
     )  # fmt: skip
+    last_m, count, elapsed_s = memory
     return SmoothingState(smoothed_m=smoothed_m, carrier_m=last_m, count=count, elapsed_s=elapsed_s), smoothed_m
 
 

@@ -56,7 +56,7 @@ def predict_ranges(
         Band of the pseudoranges.
     """
     band_code_m = np.ascontiguousarray(code_m)
-    range_m, clock_s, elevation_rad, azimuth_rad = predicted_ranges(
+    expected, directions = predicted_ranges(
         ephemeris.values, int(gps_week), float(tow_s), band_code_m, site.positions_m, site.enu, int(band)
     )
-    return PredictedRanges(range_m, clock_s, elevation_rad, azimuth_rad)
+    return PredictedRanges(*expected, *directions)

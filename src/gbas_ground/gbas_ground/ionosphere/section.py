@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Annotated, Final, Literal
 
 from gbas_core.parameters import Parameter, ParameterError, parameters
-from gbas_core.positioning.approach import FOOT_M, VAL_LOW_FT
+from gbas_core.positioning.kernels.approach import FOOT_M, VAL_LOW_FT
 from gbas_ground.ionosphere.threat import THREATS, FrontThreat
 
 NO_THREAT: Final = "none"

@@ -72,7 +72,7 @@ def track_channels(state: TrackState, received: Received, station: PreparedStati
     """Check the channels, exclude what fails, and smooth the rest."""
     now, raw, params = received.now, received.raw, station.params
     predicted = predict_ranges(received.known.current, now.gps_week, now.tow_s, raw.code_m[:, L1], station.site)
-    tracked, comparable, correction_m, known_m = compare(
+    (tracked, comparable), (correction_m, known_m) = compare(
         raw.code_m, raw.carrier_m, predicted.range_m, predicted.clock_s, received.changed
     )
     checks = _channel_checks(raw, correction_m, tracked, comparable, params)

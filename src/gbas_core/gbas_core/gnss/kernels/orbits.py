@@ -276,14 +276,14 @@ def transmit_places(values, gps_week, tow_rx_s, pseudorange_m, band):  # type: i
 
 @compiled
 def predicted_ranges(values, gps_week, tow_s, code_m, positions_m, enu, band):  # type: ignore[no-untyped-def]
-    """Ranges and clocks ``(R, N)`` at receivers, elevations and azimuths ``(N,)`` at the last of the positions.
+    """Ranges and clocks ``(2, R, N)`` at receivers, elevations and azimuths ``(2, N)`` at the last of the positions.
 
     Pseudoranges ``(R, N)``, positions ``(R + 1, 3)``, axes at the last ``(3, 3)``; see
     :func:`gbas_ground.channels.predicted_ranges.predict_ranges`.
     """
     n_receivers, n_sats = code_m.shape
-    range_m, clock_s = np.full(code_m.shape, np.nan), np.full(code_m.shape, np.nan)
-    elevation, azimuth = np.full(n_sats, np.nan), np.full(n_sats, np.nan)
+    expected, directions = np.full((2, *code_m.shape), np.nan), np.full((2, n_sats), np.nan)
+    range_m, clock_s, elevation, azimuth = expected[0], expected[1], directions[0], directions[1]
     for s in range(n_sats):
         if not np.isfinite(values[_MESSAGE, s]):
             continue
@@ -295,4 +295,4 @@ def predicted_ranges(values, gps_week, tow_s, code_m, positions_m, enu, band):  
             if np.isfinite(code_m[r, s]):
                 at_x, at_y, at_z, clock_s[r, s] = transmit_place(values, s, gps_week, tow_s, code_m[r, s], band)
             range_m[r, s], _, _, _ = rotated_range(positions_m[r], at_x, at_y, at_z)
-    return range_m, clock_s, elevation, azimuth
+    return expected, directions

@@ -152,7 +152,8 @@ def find_slips(  # type: ignore[no-untyped-def]
     code_m, carrier_m, doppler_hz, lli, range_m, before_code_m, before_carrier_m, before_doppler_hz, before_mps,
     before_mps2, before_range_m, before_followed_m, before_dt_s, dt_s, limits,
 ):  # fmt: skip
-    """Causes, slips, carriers, rates and accelerations ``(R, bands, N)``, followed steps and clock steps ``(R,)``.
+    """Causes and slips ``(R, bands, N)``; carriers, rates and accelerations ``(3, R, bands, N)``; followed steps and
+    clock steps ``(2, R)``.
 
     Observations ``(R, bands, N)``, ranges ``(R, 1, N)`` and what was remembered of the epoch before, see
     :class:`gbas_core.ranging.slips.SlipState`.
@@ -160,8 +161,10 @@ def find_slips(  # type: ignore[no-untyped-def]
     shape = code_m.shape
     n_receivers, n_bands, n_sats = shape
     cause, slipped = np.zeros(shape, np.uint8), np.zeros(shape, np.bool_)
-    continued_m, rate_mps, rate_mps2 = np.empty(shape), np.full(shape, np.nan), np.empty(shape)
-    followed_m, step_m = before_followed_m.copy(), np.zeros(n_receivers)
+    moving, steps_m = np.full((3, *shape), np.nan), np.zeros((2, n_receivers))
+    continued_m, rate_mps, rate_mps2 = moving[0], moving[1], moving[2]
+    followed_m, step_m = steps_m[0], steps_m[1]
+    followed_m[:] = before_followed_m
     change, residual, values = np.empty((5, *shape[1:])), np.empty((3, *shape[1:])), np.empty(n_bands * n_sats)
     compared, mean_s = 0.0 < dt_s <= limits.max_gap_s, 0.5 * (dt_s + before_dt_s)
     for r in range(n_receivers):
@@ -197,4 +200,4 @@ def find_slips(  # type: ignore[no-untyped-def]
                 if compared and not slipped[r, b, s]:
                     rate_mps[r, b, s] = (change[0, b, s] - carriers_step_m) / true_dt_s
                 rate_mps2[r, b, s] = (rate_mps[r, b, s] - before_mps[r, b, s]) / mean_s
-    return cause, slipped, continued_m, rate_mps, rate_mps2, followed_m, step_m
+    return cause, slipped, moving, steps_m

@@ -40,13 +40,15 @@ def filter_weight(tau_s, dt_s, count, elapsed_s, start):  # type: ignore[no-unty
 def smooth(  # type: ignore[no-untyped-def]
     code_m, carrier_m, slipped, bands, before_m, before_carrier_m, before_count, before_s, dt_s, max_gap_s, tau_s, start
 ):
-    """Smoothed ranges ``(tau, R, bands, N)``; carriers, counts and ages ``(R, bands, N)``.
+    """Smoothed ranges ``(tau, R, bands, N)``; carriers, counts and ages ``(3, R, bands, N)``.
 
     ``code_m``, ``carrier_m`` and ``slipped`` are of all bands, ``bands`` those that are smoothed, the rest the state
     before; see :func:`gbas_core.ranging.smoothing.smooth_step`.
     """
     smoothed_m = np.full(before_m.shape, np.nan)
-    last_m, count, age_s = np.full(before_s.shape, np.nan), np.zeros(before_s.shape), np.full(before_s.shape, np.nan)
+    memory = np.full((3, *before_s.shape), np.nan)
+    last_m, count, age_s = memory[0], memory[1], memory[2]
+    count[:] = 0.0
     goes_on = 0.0 < dt_s <= max_gap_s
     for r in range(before_s.shape[0]):
         for place, band in enumerate(bands):
@@ -65,4 +67,4 @@ def smooth(  # type: ignore[no-untyped-def]
                 for t in range(tau_s.shape[0]):
                     weight = filter_weight(tau_s[t], dt_s, count[r, place, s], age_s[r, place, s], start)
                     smoothed_m[t, r, place, s] = hatch_step(before_m[t, r, place, s], code, delta_m, weight)
-    return smoothed_m, last_m, count, age_s
+    return smoothed_m, memory

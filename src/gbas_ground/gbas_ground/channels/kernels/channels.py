@@ -44,17 +44,14 @@ def compare(code_m, carrier_m, range_m, clock_s, changed):
 
     Returns
     -------
-    tracked : (R, N) bool array
-        With code and carrier.
-    comparable : (R, N) bool array
-        And with an ephemeris.
-    correction_m : (R, N) array
-        PR_sc of the raw code.
-    known_m : (R, N) array
-        Expected range less satellite clock, for the slip tests; missing where another ephemeris would look like a slip.
+    channels : (2, R, N) bool array
+        With code and carrier; and with an ephemeris, too.
+    ranges_m : (2, R, N) array
+        PR_sc of the raw code; expected range less satellite clock, for the slip tests, which is missing where another
+        ephemeris would look like a slip.
     """
-    tracked, comparable = np.zeros(range_m.shape, np.bool_), np.zeros(range_m.shape, np.bool_)
-    correction_m, known_m = np.empty(range_m.shape), np.full(range_m.shape, np.nan)
+    channels, ranges_m = np.zeros((2, *range_m.shape), np.bool_), np.full((2, *range_m.shape), np.nan)
+    tracked, comparable, correction_m, known_m = channels[0], channels[1], ranges_m[0], ranges_m[1]
     for r in range(range_m.shape[0]):
         for s in range(range_m.shape[1]):
             code, expected, clock = code_m[r, L1, s], range_m[r, s], clock_s[r, s]
@@ -63,7 +60,7 @@ def compare(code_m, carrier_m, range_m, clock_s, changed):
             correction_m[r, s] = _range_correction_m(expected, code, clock)
             if not changed[s]:
                 known_m[r, s] = expected - SPEED_OF_LIGHT_MPS * clock
-    return tracked, comparable, correction_m, known_m
+    return channels, ranges_m
 
 
 @compiled
