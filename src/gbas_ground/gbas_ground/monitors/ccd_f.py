@@ -318,6 +318,8 @@ def _step(state: TwoFrequencyState, epoch: MonitoredEpoch) -> tuple[TwoFrequency
 
 def _likeliest_mode(epoch: TwoFrequencyEpoch, due: BoolArray, params: TwoFrequencyParams) -> dict[str, FloatArray]:
     """Mode and its probability of the satellites that fail; missing for the rest."""
+    if not epoch.sound.failed.any():
+        return {}
     failed = due & epoch.sound.failed & np.isfinite(epoch.sound.statistic)
     if not failed.any():
         return {}

@@ -238,8 +238,9 @@ def _initial(station: PreparedStation) -> PowerExpectationState:
 def _step(state: PowerExpectationState, epoch: MonitoredEpoch) -> tuple[PowerExpectationState, MonitorOutput]:
     """A receiver that gives no C/N0 fails where the station requires it, and is not looked at otherwise."""
     inputs, params = epoch.inputs, epoch.inputs.station.expected_power
-    given = np.isfinite(inputs.cn0_dbhz[:, L1])
-    due = inputs.ready & inputs.due & (given | inputs.station.params.signal_power.require_cn0)
+    due = inputs.ready & inputs.due
+    if not inputs.station.params.signal_power.require_cn0:
+        due = due & np.isfinite(inputs.cn0_dbhz[:, L1])
     state, found = power_expectation_step(
         state, inputs.cn0_dbhz, due, inputs.predicted.elevation_rad, inputs.dt_s, params
     )

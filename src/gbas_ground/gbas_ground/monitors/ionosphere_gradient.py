@@ -31,7 +31,7 @@ import numpy as np
 
 from gbas_core.parameters import Derived, Parameter, ParameterError, parameters
 from gbas_core.record import BoolArray, FloatArray, IntArray
-from gbas_core.satellites import missing
+from gbas_core.satellites import N_SATS, missing
 from gbas_core.signals import BAND_INDEX, L1, L5, WAVELENGTH_M, Band
 from gbas_ground.monitors.carrier_noise import CarrierNoise
 from gbas_ground.monitors.double_difference import DoubleDifferences, Pairing
@@ -214,8 +214,8 @@ def _details(
     details: dict[str, Any] = {"gradient": found.gradient, "gradient_coverage": found.coverage}
     for name, band in (("double_difference_m", L1), ("double_difference_l5_m", L5)):
         if band in bands:
-            details[name] = missing(len(BASELINES))
-            details[name][site.rows] = differences.residual_m[:, bands.index(band)]
+            details[name] = np.empty((len(BASELINES), N_SATS))
+            kernels.spread(differences.residual_m, bands.index(band), site.rows, details[name])
     return details
 
 

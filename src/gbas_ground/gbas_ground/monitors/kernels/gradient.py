@@ -119,3 +119,12 @@ def bound_by(bound, code, which, excess, elevation_rad, table):
     for sat in range(len(bound)):
         if code[sat] == which:
             bound[sat] = excess[sat] * supported(elevation_rad[sat], table)
+
+
+@compiled
+def spread(residual_m, band, rows, table):
+    """Double differences of a band in the rows of the table's baselines, ``(K, N)``; NaN in the others."""
+    table[:] = np.nan
+    for row in range(len(rows)):
+        for sat in range(table.shape[1]):
+            table[rows[row], sat] = residual_m[row, band, sat]
