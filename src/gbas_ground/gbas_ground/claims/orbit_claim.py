@@ -152,8 +152,7 @@ def orbit_bound(differences: DoubleDifferences, elevation_rad: FloatArray, site:
     (own_m,) = site.noise.sigma_m(elevation_rad, site.monitor.bands[:1])
     residual_m, sigma_m, nominal_m, _ = differences
     kernels.noise_excess(residual_m, sigma_m, nominal_m, own_m, site.scale, site.reference_m, code, excess)
-    codes: list[int] = code.tolist()
-    for each in set(codes) - {0}:
+    for each in set(code.tolist()) - {0}:  # type: ignore[call-overload]
         table = _known_table(site, (each >> site.rows & 1) > 0)
         kernels.bound_by(bound, code, each, excess, elevation_rad, table)
     return bound

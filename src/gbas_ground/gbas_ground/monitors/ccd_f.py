@@ -131,7 +131,8 @@ class TwoFrequencyParams:
     @cached_property
     def published_inverse(self) -> FloatArray:
         """Of the published covariance; it is for L1 and L5 alone, and so singular only with their ratio."""
-        return PRINTED_INVERSE if (self.band, self.other) == (L1, L5) else np.full((4, 4), np.nan)
+        applies = (self.band, self.other) == (L1, L5)
+        return np.where(applies, PRINTED_INVERSE, np.nan)
 
     @property
     def band(self) -> int:

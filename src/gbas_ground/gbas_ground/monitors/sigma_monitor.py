@@ -215,12 +215,12 @@ class SigmaMonitorState:
     @property
     def count(self) -> FloatArray:
         """Samples taken, ``(R, N)``."""
-        return self.samples[0]
+        return np.asarray(self.samples[0])
 
     @property
     def since_s(self) -> FloatArray:
         """Time since the last one, ``(R, N)`` [s]."""
-        return self.samples[1]
+        return np.asarray(self.samples[1])
 
 
 def initial_sigma_monitor(n_receivers: int, params: SigmaMonitorParams) -> SigmaMonitorState:

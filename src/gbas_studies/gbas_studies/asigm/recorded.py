@@ -110,10 +110,10 @@ def pair_series(chosen: RecordedSet, data: Path, n_epochs: int | None = None) ->
             params.bands,
         )
         found = check_ionosphere_gradient(made, due, site, params)
-        each = by_baseline(found, made, site, params)
+        tested = by_baseline(found, made, site, params)
         rows.append(
             (
-                made.residual_m[0], made.sigma_m[0], each.statistic[0], each.threshold[0],
+                made.residual_m[0], made.sigma_m[0], tested.statistic[0], tested.threshold[0],
                 predicted.elevation_rad, found.verdict.failed,
             )
         )  # fmt: skip
