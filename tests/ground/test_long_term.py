@@ -21,9 +21,10 @@ TEN = np.arange(N_SATS) < 10
 def bad_receiver(station):
     """Full windows in which the second receiver's B values had ten times their sigma on ten satellites."""
     state = initial_long_term(station)
-    square = np.ones_like(state.square)
-    square[:, :, 1] = 100.0
-    return replace(state, square=square, count=np.where(TEN, 1000.0, np.zeros_like(state.count)))
+    estimates, samples = state.estimates.copy(), state.samples.copy()
+    estimates[1], samples[0] = 1.0, np.where(TEN, 1000.0, 0.0)
+    estimates[1, :, :, 1] = 100.0
+    return replace(state, estimates=estimates, samples=samples)
 
 
 def excluded(latch, row):
@@ -45,7 +46,8 @@ def nothing_used():
 @pytest.mark.parametrize(("since_s", "clear_s"), [(10.0, 0.0), (1e5, 50.0)])
 def test_an_excluded_receiver_is_not_clear_while_its_estimates_are_remembered(since_s, clear_s):
     station = params(4)
-    state = replace(bad_receiver(station), since_s=np.full((4, N_SATS), since_s))
+    state = bad_receiver(station)
+    state.samples[1] = since_s
     before = no_exclusions(station)
     before = replace(before, receivers=excluded(before.receivers, 1))
     _, after, findings, _ = monitor_sigmas(state, nothing_used(), before, 0.5, station)

@@ -53,7 +53,7 @@ def measure_ccd(n_epochs: int) -> Part:
 def _monitors_s(n_epochs: int) -> float:
     epochs = [_epoch(number) for number in range(n_epochs)]
     single_params, double_params = CcdParams(), TwoFrequencyParams()
-    single, double = initial_ccd(single_params, RECEIVERS), initial_two_frequency(double_params, RECEIVERS)
+    single, double = initial_ccd(RECEIVERS), initial_two_frequency(RECEIVERS)
     taken = []
     for number, epoch in enumerate(epochs):
         dt_s = _T_S if number else float("nan")

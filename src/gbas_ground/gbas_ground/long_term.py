@@ -7,6 +7,7 @@ see anything, so half a second more is nothing.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from gbas_core.record import BoolArray
 from gbas_core.satellites import SAT_IDS
 from gbas_ground.consistency import Corrections, Exclusions, Finding
 from gbas_ground.exclusions import exclude
-from gbas_ground.monitors.monitor_table import Summaries, summarise, worst_of
+from gbas_ground.monitors.monitor_table import Summaries, summarise_each, worst_of
 from gbas_ground.monitors.result import MonitorResult
 from gbas_ground.monitors.sigma_monitor import (
     SigmaMonitorResult,
@@ -26,6 +27,8 @@ from gbas_ground.monitors.sigma_monitor import (
 from gbas_ground.params import GroundParams
 from gbas_msgs_py.codes import ExclusionCause
 from gbas_msgs_py.monitors import SIGMA_MONITOR
+
+_KEYS: Final = (SIGMA_MONITOR.key("mean"), SIGMA_MONITOR.key("spread"))
 
 
 def initial_long_term(params: GroundParams) -> SigmaMonitorState:
@@ -52,11 +55,8 @@ def monitor_sigmas(
     due = used | (~exclusions.usable_channels() & remembered)
     normalised = normalised_b(corrections.b_m, corrections.channel_sigma_m, used)
     state, result = sigma_monitor_step(state, normalised, due, dt_s, settings)
-    summaries = {
-        SIGMA_MONITOR.key("mean"): summarise(result.mean, used),
-        SIGMA_MONITOR.key("spread"): summarise(result.variance, used),
-    }
-    if not params.sigma_monitor.exclude:
+    summaries = dict(zip(_KEYS, summarise_each(result.channels, np.logical_or.reduce(used)), strict=True))
+    if not params.sigma_monitor.exclude or not (result.channels.failed.any() or result.receivers.failed.any()):
         return state, exclusions, (), summaries
     exclusions, findings = _excluded(exclusions, result)
     return state, exclusions, findings, summaries

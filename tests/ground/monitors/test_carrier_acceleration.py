@@ -14,6 +14,7 @@ from gbas_ground.channels.predicted_ranges import site_of
 from gbas_ground.monitors.carrier_acceleration import (
     FEWEST_OTHERS,
     CarrierAccelerationParams,
+    Carriers,
     carrier_acceleration_step,
     fewest_others,
     initial_carrier_acceleration,
@@ -48,10 +49,9 @@ def run(values, *, params=PARAMS, restarted=None, due=None, dt_s=None, shift=Non
         interval = np.nan if number == 0 else (T if dt_s is None else dt_s[number])
         wanted = np.broadcast_to(HERE, (receivers, N_SATS)) if due is None else due
         late = wanted if number >= params.least_points - 1 else np.zeros_like(wanted)
-        state, result = carrier_acceleration_step(
-            state, values[number], NEVER[:receivers] if restarted is None else restarted[number], late, ELEVATION,
-            interval, params, shift_m=None if shift is None else shift[number],
-        )  # fmt: skip
+        slips = NEVER[:receivers] if restarted is None else restarted[number]
+        seen = Carriers(values[number], slips, late, ELEVATION, None if shift is None else shift[number])
+        state, result = carrier_acceleration_step(state, seen, interval, params)
         results.append(result)
     return state, results
 
@@ -272,9 +272,8 @@ def test_recorded_pairs_have_no_false_alarm(data_dir, name, bands):
         before = epoch.key
         restarted = epoch.restarted[:, list(bands)]
         due = np.zeros((2, N_SATS), dtype=bool)
-        state, result = carrier_acceleration_step(
-            state, residual, restarted, due, epoch.elevation_rad, dt, params, shift_m=epoch.shift_m
-        )
+        seen = Carriers(residual, restarted, due, epoch.elevation_rad, epoch.shift_m)
+        state, result = carrier_acceleration_step(state, seen, dt, params)
         high = epoch.elevation_rad >= np.radians(5.0)
         ratio = (result.channels.statistic / result.channels.threshold)[..., high]
         judged += int(np.isfinite(ratio).sum())

@@ -17,7 +17,7 @@ QUICK = CcdParams(filters=DivergenceParams(settle_s=20.0))
 
 def run(code_rate_mps, *, params=QUICK, receivers=3, epochs=400, used=None, change=lambda number, code, carrier: None):
     """Step a monitor over ranges that grow; `code_rate_mps` (R, N_BANDS, N) is what the code has in excess."""
-    state = initial_ccd(params, receivers)
+    state = initial_ccd(receivers)
     shape = (receivers, N_BANDS, N)
     here = np.isin(np.arange(N), (FAULTY, SOUND))
     used = np.ones((receivers, N), dtype=bool) if used is None else used

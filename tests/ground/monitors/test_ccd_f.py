@@ -63,7 +63,7 @@ class World:
 
 
 def run(world, *, params=QUICK, epochs=200, change=lambda number, seen: None, keep=False):
-    state = initial_two_frequency(params, world.receivers)
+    state = initial_two_frequency(world.receivers)
     results, inputs = [], []
     for number in range(epochs):
         seen = world.epoch(number, params)

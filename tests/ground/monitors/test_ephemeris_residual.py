@@ -23,6 +23,7 @@ from gbas_ground.monitors.double_difference import (
 )
 from gbas_ground.monitors.ephemeris_residual import (
     EphemerisResidualParams,
+    Orbits,
     decorrelation,
     ephemeris_residual_step,
     initial_ephemeris_residual,
@@ -53,10 +54,8 @@ def given(residual_m, sigma_m=0.005):
 def run(series, *, params=PARAMS, dt_s=0.5, shift=None, site=SITE):
     state, results = initial_ephemeris_residual(len(site), params), []
     for number, each in enumerate(series):
-        state, result = ephemeris_residual_step(
-            state, each, site, HERE, np.nan if number == 0 else dt_s, params,
-            shift_m=None if shift is None else shift[number],
-        )  # fmt: skip
+        seen = Orbits(each, HERE, None if shift is None else shift[number])
+        state, result = ephemeris_residual_step(state, seen, site, np.nan if number == 0 else dt_s, params)
         results.append(result)
     return state, results
 
@@ -175,7 +174,7 @@ def test_a_slow_orbit_error_is_followed_beyond_half_a_wavelength():
     # L5 through 1.9, L1 through 2.5 wavelengths
     assert failed[first + 20 :, 4].all()
     assert not np.delete(failed, 4, axis=1).any()
-    assert state.followed_m[2, :, 4] == pytest.approx([0.478, 0.478], abs=5 * 0.003)
+    assert state.followed[0, 2, :, 4] == pytest.approx([0.478, 0.478], abs=5 * 0.003)
 
 
 def test_slips_of_whole_wavelengths_are_none():
@@ -193,9 +192,9 @@ def test_gaps_and_new_ephemerides():
     after[..., 4] = 0.16
     noise = 0.002 * rng.normal(size=(2, *SHAPE))
     state, _ = run([given(before + noise[0]), given(after + noise[1])], dt_s=50.0)
-    assert state.followed_m[0, 0, 4] == pytest.approx(0.16, abs=0.01)  # followed
+    assert state.followed[0, 0, 0, 4] == pytest.approx(0.16, abs=0.01)  # followed
     state, _ = run([given(before + noise[0]), given(after + noise[1])], dt_s=70.0)
-    assert state.followed_m[0, 0, 4] == pytest.approx(0.16 - WAVELENGTH_M[L1], abs=0.01)  # began anew
+    assert state.followed[0, 0, 0, 4] == pytest.approx(0.16 - WAVELENGTH_M[L1], abs=0.01)  # began anew
     # A new ephemeris takes the error away at once: a jump of more than half a wavelength, which the shift tells.
     shift = np.zeros((2, 4, N_SATS))
     shift[1, 1, 4] = -0.16
@@ -206,7 +205,7 @@ def test_gaps_and_new_ephemerides():
     state, results = run([*steps, given(np.zeros(SHAPE))], shift=[None, None, None, shift[1]])
     assert results[2].failed[4]
     assert not results[3].failed[4]
-    assert np.abs(state.followed_m[..., 4]).max() < 1e-12
+    assert np.abs(state.followed[0, ..., 4]).max() < 1e-12
 
 
 def test_false_alarms_and_missed_detections_by_simulation():
@@ -234,11 +233,11 @@ def test_missing_is_not_good():
     value[..., 3] = np.nan
     value[1:, :, 5] = np.nan  # one baseline left: looked at
     value[:, 1, 6] = np.nan  # L1 alone: looked at
-    gone = replace(one, residual_m=value, sigma_m=np.where(np.isnan(value), np.nan, 0.005))
+    gone = one._replace(residual_m=value, sigma_m=np.where(np.isnan(value), np.nan, 0.005))
     _, results = run([one, gone])
     assert np.flatnonzero(HERE & np.isnan(results[1].statistic)).tolist() == [3]
     assert not results[1].failed.any()
-    nothing = replace(one, residual_m=np.full(SHAPE, np.nan), sigma_m=np.full(SHAPE, np.nan))
+    nothing = one._replace(residual_m=np.full(SHAPE, np.nan), sigma_m=np.full(SHAPE, np.nan))
     _, results = run([nothing])
     assert np.isnan(results[0].statistic).all()
     single = baselines_of(BRAUNSCHWEIG_M[:1], BRAUNSCHWEIG_M[0])
@@ -264,9 +263,8 @@ def test_recorded_pairs_have_no_false_alarm(data_dir, name, bands):
         made = double_differences(
             residual, baselines, reference_satellites(due, epoch.elevation_rad, 5), epoch.elevation_rad, NOISE, bands
         )
-        state, result = ephemeris_residual_step(
-            state, made, baselines, due, np.nan if number == 0 else 1.0, params, shift_m=epoch.shift_m
-        )
+        seen = Orbits(made, due, epoch.shift_m)
+        state, result = ephemeris_residual_step(state, seen, baselines, np.nan if number == 0 else 1.0, params)
         assert not result.failed.any()
         largest = max(largest, float(np.max((result.statistic / result.threshold)[due])))
     assert largest > 0.15

@@ -130,7 +130,7 @@ def test_what_is_learnt_raises_the_minimum_and_never_lowers_it():
     params = replace(PARAMS, learn=True, learnt_after_s=60.0, drop_db=4.0)
     state, results = run(level(200, above_db=9.0), params=params)
     # 9 above the table; 4 below that is 5 above it (the bins' width moves the table by up to 5 deg x 0.3 dB/deg)
-    raised = -results[-1].satellites.threshold[0, HERE] + results[-1].channels.threshold[0, HERE] - 4.0
+    raised = -results[-1].satellites.threshold[0, HERE] + results[-1].channels.threshold[0, 0, HERE] - 4.0
     assert raised == pytest.approx(5.0, abs=0.6)
     dropped = level(10, above_db=9.0)
     dropped[..., 5] -= 7.0  # still 2 above the table
@@ -154,8 +154,8 @@ def test_learning_is_a_mean_over_a_bin():
         inside = bins == number
         if inside.any():
             expected = values[1:, 2, L5][:, inside].mean()  # the first epoch has no interval
-            assert state.learnt_dbhz[2, 1, number] == pytest.approx(expected, rel=1e-12)
-            assert state.learnt_s[2, 1, number] == pytest.approx(24.5)
+            assert state.learnt[0, 2, 1, number] == pytest.approx(expected, rel=1e-12)
+            assert state.learnt[1, 2, 1, number] == pytest.approx(24.5)
 
 
 def test_recorded_pair_has_power(data_dir):

@@ -29,7 +29,11 @@ from gbas_ground.monitors.gradient_detectability import (
     double_difference_sigma_m,
 )
 from gbas_ground.monitors.gradient_estimates import gradient_set
-from gbas_ground.monitors.ionosphere_gradient import IonosphereGradientParams, check_ionosphere_gradient
+from gbas_ground.monitors.ionosphere_gradient import (
+    IonosphereGradientParams,
+    by_baseline,
+    check_ionosphere_gradient,
+)
 from gbas_ground.params import GroundParams
 from gbas_sim.atmosphere.fronts import WedgeFront
 from gbas_sim.atmosphere.troposphere import Troposphere as SimulatedTroposphere
@@ -381,10 +385,12 @@ def test_second_band_and_all_fusion():
     assert (both.coverage[HERE] >= one.coverage[HERE]).all()
     assert (both.coverage[HERE] > one.coverage[HERE]).any()
     every = IonosphereGradientParams(runway_bearing_rad=(RUNWAY_RAD,), fuse="all")
-    strict = verdict(residual, gradient_site(BRAUNSCHWEIG_M, BRAUNSCHWEIG_M[0], every), params=every)[1]
+    its_site = gradient_site(BRAUNSCHWEIG_M, BRAUNSCHWEIG_M[0], every)
+    made, strict = verdict(residual, its_site, params=every)
     assert (strict.coverage <= both.coverage).all()
     assert both.verdict.failed[20]
-    ratio = (strict.by_baseline.statistic / strict.by_baseline.threshold)[..., HERE]
+    each = by_baseline(strict, made, its_site, every)
+    ratio = (each.statistic / each.threshold)[..., HERE]
     decided = (strict.verdict.statistic / strict.verdict.threshold)[HERE]
     np.testing.assert_allclose(decided, np.nanmax(ratio.min(axis=0), axis=0), rtol=1e-12)  # NaN: a band not tested
 
@@ -472,7 +478,8 @@ def test_tests_that_are_run_are_those_that_coverage_is_of():
     references = reference_satellites(HERE, low, PARAMS.references)
     made = double_differences(residual, site.baselines, references, low, PARAMS.noise, PARAMS.bands)
     result = check_ionosphere_gradient(made, HERE, site, PARAMS)
-    looked = np.isfinite(result.by_baseline.statistic).any(axis=0)
+    each = by_baseline(result, made, site, PARAMS)
+    looked = np.isfinite(each.statistic).any(axis=0)
     tested = site.masks[result.chosen].T
     assert not (looked & ~tested).any()
     number = tested.sum(axis=0)
@@ -480,7 +487,7 @@ def test_tests_that_are_run_are_those_that_coverage_is_of():
     for satellite in np.flatnonzero(looked.any(axis=0)):
         k = false_alarm_multiplier(PARAMS.p_false_alarm, tests=int(number[satellite]))
         limit = k * made.sigma_m[0, :, satellite]
-        np.testing.assert_allclose(result.by_baseline.threshold[0, :, satellite], limit, rtol=1e-12)
+        np.testing.assert_allclose(each.threshold[0, :, satellite], limit, rtol=1e-12)
         own = IonosphereGradientParams(
             runway_bearing_rad=(RUNWAY_RAD,),
             carriers=tuple(np.array(PARAMS.carriers)[tested[:, satellite]].tolist()),

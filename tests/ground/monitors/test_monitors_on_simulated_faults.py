@@ -8,7 +8,11 @@ import pytest
 from gbas_core.gnss.frames import geodetic_from_ecef, rot_enu_ecef
 from gbas_core.satellites import SAT_INDEX
 from gbas_core.signals import L1, L5
-from gbas_ground.monitors.carrier_acceleration import carrier_acceleration_step, initial_carrier_acceleration
+from gbas_ground.monitors.carrier_acceleration import (
+    Carriers,
+    carrier_acceleration_step,
+    initial_carrier_acceleration,
+)
 from gbas_ground.monitors.double_difference import (
     Troposphere,
     carrier_residual_m,
@@ -16,6 +20,7 @@ from gbas_ground.monitors.double_difference import (
     reference_satellites,
 )
 from gbas_ground.monitors.ephemeris_residual import (
+    Orbits,
     ephemeris_residual_step,
     initial_ephemeris_residual,
     site_decorrelation,
@@ -30,8 +35,7 @@ from gbas_sim.atmosphere.fronts import WedgeFront
 from gbas_sim.atmosphere.troposphere import Troposphere as SimulatedTroposphere
 from gbas_sim.faults.kinds import ExcessiveAcceleration, LowPower, OrbitFault
 from gbas_sim.receivers.presets import receiver_preset
-from gbas_sim.world import World
-from gbas_sim.world_params import WorldParams
+from gbas_sim.world import World, WorldParams
 from monitor_scenes import BRAUNSCHWEIG_M, RUNWAY_RAD, STATION, simulated, station_gradient, station_of
 
 AIR = Troposphere(refractivity=330.0, scale_height_m=7900.0)
@@ -75,11 +79,11 @@ def verdicts(*, seconds=12.0, seed=1, **threats):
         result = check_ionosphere_gradient(made, due.any(axis=0), site, gradient)
         found["gradient"].append(result.verdict.failed & result.monitored)
         restarted = epoch.restarted[:, list(BANDS)]
-        moved, each = carrier_acceleration_step(moved, residual, restarted, due, high, dt, settings[0])
+        moved, each = carrier_acceleration_step(moved, Carriers(residual, restarted, due, high), dt, settings[0])
         found["acceleration"].append(each.failed_satellites)
         power, low = power_expectation_step(power, epoch.cn0_dbhz, due, high, dt, settings[1])
         found["power"].append(low.satellites.failed.any(axis=0))
-        orbit, away = ephemeris_residual_step(orbit, made, site.baselines, due.any(axis=0), dt, settings[2])
+        orbit, away = ephemeris_residual_step(orbit, Orbits(made, due.any(axis=0)), site.baselines, dt, settings[2])
         found["ephemeris"].append(away.failed)
     return {name: np.array(each) for name, each in found.items()}, epochs
 

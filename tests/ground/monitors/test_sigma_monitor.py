@@ -63,8 +63,8 @@ def test_recursion_is_the_weighted_sum_of_what_was_sampled():
                 since = 0.0
         mean, square = stored_estimates(taken, PARAMS.window_s[window], PARAMS.sample_s)
         assert state.count[receiver, satellite] == len(taken) > 35
-        assert state.mean[place] == pytest.approx(mean, rel=1e-12)
-        assert state.square[place] == pytest.approx(square, rel=1e-12)
+        assert state.estimates[0][place] == pytest.approx(mean, rel=1e-12)
+        assert state.estimates[1][place] == pytest.approx(square, rel=1e-12)
 
 
 @pytest.mark.parametrize("count", [1, 2, 30, 90])

@@ -32,16 +32,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Final
 
 import numpy as np
 
 from gbas_core.compiled import compiled
-from gbas_core.record import BoolArray, FloatArray
+from gbas_core.record import BoolArray, FloatArray, IntArray
 from gbas_ground.claims.limits import MAX_DECORRELATION
 from gbas_ground.monitors.carrier_noise import CarrierNoise
 from gbas_ground.monitors.double_difference import Baselines, DoubleDifferences
-from gbas_ground.monitors.ephemeris_residual import EphemerisResidualParams, assumed_sigma_m, site_decorrelation
+from gbas_ground.monitors.ephemeris_residual import (
+    REFERENCE_ELEVATION_RAD,
+    EphemerisResidualParams,
+    site_decorrelation,
+)
 from gbas_ground.monitors.kernels import gradient as kernels
 
 DECORRELATION_STEP: Final = 5.0e-6
@@ -69,6 +74,22 @@ class OrbitSite:
     monitor: EphemerisResidualParams
     _tables: dict[bytes, FloatArray] = field(default_factory=dict, repr=False)  # by the baselines that see
 
+    @cached_property
+    def rows(self) -> IntArray:
+        """Places of the baselines."""
+        return np.arange(len(self.baselines))
+
+    @cached_property
+    def scale(self) -> FloatArray:
+        """How the noise of the baselines compares, ``(B,)``."""
+        factors = self.noise.factors(len(self.baselines.place_m))
+        return np.asarray(np.hypot(factors[self.baselines.first], factors[self.baselines.second]))
+
+    @cached_property
+    def reference_m(self) -> float:
+        """Sigma of the lowest reference satellite that is reckoned with [m]."""
+        return float(self.noise.sigma_m(np.array([REFERENCE_ELEVATION_RAD]), self.monitor.bands[:1])[0, 0])
+
 
 def supported_decorrelation(site: OrbitSite, elevation_rad: FloatArray, seen: BoolArray | None = None) -> FloatArray:
     """P that the station's monitor supports at elevations, whatever the azimuth.
@@ -86,14 +107,16 @@ def supported_decorrelation(site: OrbitSite, elevation_rad: FloatArray, seen: Bo
         [m/m]: the larger one at the two whole degrees around the elevation; infinite where nothing bounds an orbit, and
         for an elevation that is not known.
     """
-    given = np.ones(len(site.baselines), dtype=bool) if seen is None else seen
-    key = given.tobytes()
-    table = site._tables.get(key)
-    if table is None:
-        table = site._tables[key] = _table(site, given)
-    degrees = np.degrees(elevation_rad)
-    known = (degrees >= 0.0) & (degrees <= 90.0)
-    return np.where(known, table[np.where(known, degrees, 0.0).astype(np.int64)], np.inf)
+    table = _known_table(site, np.ones(len(site.baselines), dtype=bool) if seen is None else seen)
+    return np.array([kernels.supported(float(each), table) for each in elevation_rad])
+
+
+def _known_table(site: OrbitSite, seen: BoolArray) -> FloatArray:
+    """:func:`_table`, made once."""
+    key = seen.tobytes()
+    if key not in site._tables:
+        site._tables[key] = _table(site, seen)
+    return site._tables[key]
 
 
 def _table(site: OrbitSite, seen: BoolArray) -> FloatArray:
@@ -127,15 +150,13 @@ def orbit_bound(differences: DoubleDifferences, elevation_rad: FloatArray, site:
     bound = np.full(elevation_rad.shape, np.inf)
     if len(site.baselines) < 2:
         return bound
-    code = kernels.seen(differences.residual_m, 1)
-    assumed_m = assumed_sigma_m(site.baselines, elevation_rad, site.noise, site.monitor)
-    excess = kernels.noise_excess(
-        differences.residual_m, differences.sigma_m, differences.nominal_sigma_m, np.ascontiguousarray(assumed_m)
-    )
-    rows = np.arange(len(site.baselines))
-    for each in set(code.tolist()) - {0}:
-        supported = supported_decorrelation(site, elevation_rad, (each >> rows & 1) > 0)
-        bound = np.where(code == each, excess * supported, bound)
+    code, excess = np.empty(bound.shape, dtype=np.int64), np.empty(bound.shape)
+    (own_m,) = site.noise.sigma_m(elevation_rad, site.monitor.bands[:1])
+    residual_m, sigma_m, nominal_m, _ = differences
+    kernels.noise_excess(residual_m, sigma_m, nominal_m, own_m, site.scale, site.reference_m, code, excess)
+    for each in set(code.tolist()) - {0}:  # type: ignore[call-overload]
+        table = _known_table(site, (each >> site.rows & 1) > 0)
+        kernels.bound_by(bound, code, each, excess, elevation_rad, table)
     return bound
 
 

@@ -21,9 +21,9 @@ Jiang, Milner, Macabiau, ENC 2015 (budget). The removal of the clocks and the th
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final, NamedTuple
 
 import numpy as np
 from scipy.special import bdtrc
@@ -37,7 +37,7 @@ from gbas_ground.monitors.false_alarm import EPOCH_S, EXPOSURE_S, FALSE_EXCLUSIO
 from gbas_ground.monitors.interface import MonitoredEpoch, MonitorOutput, SignalMonitor, Verdict
 from gbas_ground.monitors.kernels import carrier_acceleration as kernels
 from gbas_ground.monitors.monitor_table import moved, place_of_worst, signal_of, summarise_each, worst_of
-from gbas_ground.monitors.result import MonitorResult
+from gbas_ground.monitors.result import MonitorResult, upper_limit
 from gbas_msgs_py.codes import ExclusionCause
 from gbas_msgs_py.monitors import CARRIER_ACCELERATION
 
@@ -159,14 +159,38 @@ def initial_carrier_acceleration(n_receivers: int, params: CarrierAccelerationPa
     )
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class CarrierAccelerationResult:
+class Carriers(NamedTuple):
+    """What the monitor looks at, at one epoch.
+
+    Attributes
+    ----------
+    residual_m : (R, F, N) array
+        From :func:`~gbas_ground.monitors.double_difference.carrier_residual_m`, of the bands tested [m].
+    restarted : (R, F, N) bool array
+        Carriers that do not go on from the epoch before.
+    due : (R, N) bool array
+        Channels that must be monitored: a missing statistic fails.
+    elevation_rad : (N,) array
+    shift_m : (R, N) array, optional
+        Residual of this epoch less what it would be with the ephemerides of the epoch before: what a new ephemeris
+        changes, 0 elsewhere [m]. Without it, a new ephemeris is a step.
+    """
+
+    residual_m: FloatArray
+    restarted: BoolArray
+    due: BoolArray
+    elevation_rad: FloatArray
+    shift_m: FloatArray | None = None
+
+
+class CarrierAccelerationResult(NamedTuple):
     """What was found.
 
     Attributes
     ----------
-    channels : MonitorResult
-        ``(S, R, F, N)``: size of the statistics of each channel, in the order of :data:`STATISTICS`.
+    known : (3, R, F, S, N) array
+        Statistics of the channels, their variances and thresholds.
+    due : (R, N) bool array
     satellites : MonitorResult
         ``(S, F, N)``: averaged over the receivers. Also failed where channels of several receivers are.
     failed_channels : (R, N) bool array
@@ -174,77 +198,66 @@ class CarrierAccelerationResult:
     failed_satellites : (N,) bool array
     """
 
-    channels: MonitorResult
+    known: FloatArray
+    due: BoolArray
     satellites: MonitorResult
     failed_channels: BoolArray
     failed_satellites: BoolArray
 
+    @property
+    def channels(self) -> MonitorResult:
+        """Size of the statistics of each channel, in the order of :data:`STATISTICS`, ``(S, R, F, N)``."""
+        statistic, _, threshold = np.moveaxis(self.known, 3, 1)
+        first = (np.arange(statistic.shape[2]) == 0)[:, np.newaxis]
+        wanted = self.due[:, np.newaxis] & (first | np.isfinite(statistic[0]))
+        return upper_limit(np.abs(statistic), threshold, wanted)
+
 
 def carrier_acceleration_step(
-    state: CarrierAccelerationState,
-    residual_m: FloatArray,
-    restarted: BoolArray,
-    due: BoolArray,
-    elevation_rad: FloatArray,
-    dt_s: float,
-    params: CarrierAccelerationParams,
-    *,
-    shift_m: FloatArray | None = None,
+    state: CarrierAccelerationState, seen: Carriers, dt_s: float, params: CarrierAccelerationParams
 ) -> tuple[CarrierAccelerationState, CarrierAccelerationResult]:
     """Test one epoch.
 
     Parameters
     ----------
     state : CarrierAccelerationState
-    residual_m : (R, F, N) array
-        From :func:`~gbas_ground.monitors.double_difference.carrier_residual_m`, `params.bands` [m].
-    restarted : (R, F, N) bool array
-        Carriers that do not go on from the epoch before.
-    due : (R, N) bool array
-        Channels that must be monitored: a missing statistic fails.
-    elevation_rad : (N,) array
+    seen : Carriers
     dt_s : float
         Time since the epoch before [s]; NaN at the first.
     params : CarrierAccelerationParams
-    shift_m : (R, N) array, optional
-        Residual of this epoch less what it would be with the ephemerides of the epoch before: what a new ephemeris
-        changes, 0 elsewhere [m]. Without it, a new ephemeris is a step.
-
-    Returns
-    -------
-    state : CarrierAccelerationState
-    result : CarrierAccelerationResult
     """
-    noise, k = params.noise, params.multiplier(len(residual_m))
-    history, age, unseen = kernels.advanced(
-        state.residual_m,
-        state.age_s,
-        state.unseen_s,
-        np.ascontiguousarray(residual_m),
-        np.ascontiguousarray(restarted),
-        np.zeros(due.shape) if shift_m is None else shift_m,
+    n_receivers, n_bands, n_sats = shape = seen.residual_m.shape
+    n_statistics = len(STATISTICS)
+    history_m, age_s, unseen_s = np.empty(state.residual_m.shape), np.empty(len(state.age_s)), np.empty(shape)
+    known = np.empty((3, n_receivers, n_bands, n_statistics, n_sats))
+    satellites = np.empty((2, n_statistics, n_bands, n_sats))
+    failed = np.empty(satellites.shape[1:], dtype=bool)
+    failed_channels, failed_satellites = np.empty(seen.due.shape, dtype=bool), np.empty(n_sats, dtype=bool)
+    kernels.step(
+        (state.residual_m, state.age_s, state.unseen_s),
+        seen.residual_m,
+        seen.restarted,
+        seen.due,
+        params.noise.sigma_m(seen.elevation_rad, params.bands),
+        params.noise.factors(n_receivers),
+        np.zeros(seen.due.shape) if seen.shift_m is None else seen.shift_m,
+        params.common_and_natural,
         float(dt_s),
         float(params.window_s),
         float(params.max_gap_s),
-    )
-    known = kernels.judged(
-        history,
-        age,
-        noise.sigma_m(elevation_rad, params.bands),
-        noise.factors(len(residual_m)),
-        params.common_and_natural,
-        k,
+        params.multiplier(n_receivers),
         params.least_points,
         params.min_satellites,
+        (history_m, age_s, unseen_s),
+        known,
+        satellites,
+        failed,
+        failed_channels,
+        failed_satellites,
     )
-    channels, channels_failed, satellites, satellites_failed, failed_channels, failed_satellites = kernels.concluded(
-        known, due, params.common_and_natural, k
-    )
-    return CarrierAccelerationState(residual_m=history, age_s=age, unseen_s=unseen), CarrierAccelerationResult(
-        channels=MonitorResult(statistic=channels[0], threshold=channels[1], failed=channels_failed),
-        satellites=MonitorResult(statistic=satellites[0], threshold=satellites[1], failed=satellites_failed),
-        failed_channels=failed_channels,
-        failed_satellites=failed_satellites,
+    judged = MonitorResult(statistic=satellites[0], threshold=satellites[1], failed=failed)
+    return CarrierAccelerationState(residual_m=history_m, age_s=age_s, unseen_s=unseen_s), CarrierAccelerationResult(
+        known, seen.due, judged, failed_channels, failed_satellites
     )
 
 
@@ -262,16 +275,14 @@ def _initial(station: PreparedStation) -> CarrierAccelerationState:
 
 def _step(state: CarrierAccelerationState, epoch: MonitoredEpoch) -> tuple[CarrierAccelerationState, MonitorOutput]:
     inputs, params = epoch.inputs, epoch.inputs.station.carrier_acceleration
-    state, found = carrier_acceleration_step(
-        state,
-        inputs.residual_m.take(params.bands, axis=1),
+    seen = Carriers(
+        inputs.residual_of(params.bands),
         inputs.slipped.take(params.bands, axis=1),
         inputs.ready & inputs.due,
         inputs.predicted.elevation_rad,
-        inputs.dt_s,
-        params,
-        shift_m=inputs.shift_m,
+        inputs.shift_m,
     )
+    state, found = carrier_acceleration_step(state, seen, inputs.dt_s, params)
     known = np.isfinite(found.satellites.statistic[0, 0])
     signal = signal_of(params.bands)
     return state, MonitorOutput(
@@ -290,7 +301,7 @@ def _satellite_verdicts(found: CarrierAccelerationResult, due: BoolArray) -> tup
     worst = worst_of(found.satellites, axes=2)
     number, _ = place_of_worst(found.satellites, axes=2)
     return tuple(
-        Verdict(test.cause, replace(worst, failed=failed & (number == place))) for place, test in enumerate(_TESTS)
+        Verdict(test.cause, worst._replace(failed=failed & (number == place))) for place, test in enumerate(_TESTS)
     )
 
 
@@ -300,7 +311,7 @@ def _channel_verdicts(found: CarrierAccelerationResult) -> tuple[Verdict, ...]:
         return ()
     worst = worst_of(moved(found.channels, 2, 1), axes=2)
     failed = found.failed_channels & (worst.statistic > worst.threshold)
-    return (Verdict(ExclusionCause.CARRIER_ACCELERATION, replace(worst, failed=failed)),)
+    return (Verdict(ExclusionCause.CARRIER_ACCELERATION, worst._replace(failed=failed)),)
 
 
 MONITOR: Final = SignalMonitor(

@@ -70,7 +70,10 @@ def detectable_fault(
     variance = _fitted(age, np.zeros(age.size), params)[3:] * sigma_m**2 / n_receivers
     k = params.multiplier(n_receivers) + k_md
     needed = np.array(
-        [limit(float(each), *its, k) for each, its in zip(variance, params.common_and_natural.T.tolist(), strict=True)]
+        [
+            limit(float(each), common, natural, k)
+            for each, common, natural in zip(variance, *params.common_and_natural.tolist(), strict=True)
+        ]
     )
     with np.errstate(divide="ignore"):
         sizes = [needed / np.abs(fault_response(fault, each, params, interval_s)) for each in ages]

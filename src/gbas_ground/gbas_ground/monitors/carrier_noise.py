@@ -43,14 +43,17 @@ class CarrierNoise:
 
     def sigma_m(self, elevation_rad: ArrayLike, bands: tuple[int, ...]) -> FloatArray:
         """Sigma of a receiver of factor 1, ``(F, N)`` for elevations ``(N,)`` [m]."""
-        elevation = np.array(elevation_rad, dtype=np.float64, ndmin=1)
-        floor, low = self._coefficients_m.take(bands, axis=1)
-        return carrier_sigmas_m(elevation, floor, low, float(self.scale_rad))
+        elevation = np.ascontiguousarray(elevation_rad, dtype=np.float64)
+        sigma = np.empty((len(bands), len(elevation)))
+        if bands not in self._coefficients_m:
+            self._coefficients_m[bands] = np.array((self.floor_m, self.low_m), dtype=np.float64).take(bands, axis=1)
+        carrier_sigmas_m(elevation, self._coefficients_m[bands], float(self.scale_rad), sigma)
+        return sigma
 
     @cached_property
-    def _coefficients_m(self) -> FloatArray:
-        """a_0 and a_1 of all bands, ``(2, N_BANDS)`` [m]."""
-        return np.array((self.floor_m, self.low_m), dtype=np.float64)
+    def _coefficients_m(self) -> dict[tuple[int, ...], FloatArray]:
+        """a_0 and a_1, ``(2, F)``, of the bands asked for so far [m]."""
+        return {}
 
     def factors(self, n_receivers: int) -> FloatArray:
         """Factor of each receiver, ``(R,)``.
@@ -60,8 +63,13 @@ class CarrierNoise:
         ValueError
             When there are neither one nor as many as receivers.
         """
-        if len(self.receiver_factor) not in (1, n_receivers):
-            raise ValueError(f"carrier noise: {len(self.receiver_factor)} receiver factors for {n_receivers} receivers")
-        if len(self.receiver_factor) == 1:
-            return np.full(n_receivers, self.receiver_factor[0], dtype=np.float64)
-        return np.array(self.receiver_factor, dtype=np.float64)
+        if n_receivers not in self._factors:
+            if len(self.receiver_factor) not in (1, n_receivers):
+                given = len(self.receiver_factor)
+                raise ValueError(f"carrier noise: {given} receiver factors for {n_receivers} receivers")
+            self._factors[n_receivers] = np.array(np.broadcast_to(self.receiver_factor, n_receivers), dtype=np.float64)
+        return self._factors[n_receivers]
+
+    @cached_property
+    def _factors(self) -> dict[int, FloatArray]:
+        return {}

@@ -21,8 +21,6 @@ from gbas_core.ranging.divergence import (
     GROUND_SIGMA_MPS,
     GROUND_THRESHOLD_MPS,
     DivergenceParams,
-    DivergenceState,
-    initial_divergence,
 )
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import N_SATS, missing
@@ -30,6 +28,7 @@ from gbas_core.signals import L1, N_BANDS
 from gbas_ground.monitors.false_alarm import exposure_probability, least_correlation
 from gbas_ground.monitors.interface import MonitoredEpoch, MonitorOutput, SignalMonitor, verdicts
 from gbas_ground.monitors.kernels import ccd as kernels
+from gbas_ground.monitors.kernels.divergence_filter import initial_memory
 from gbas_ground.monitors.monitor_table import summarise
 from gbas_ground.monitors.result import MonitorResult, upper_limit
 from gbas_msgs_py.monitors import CCD
@@ -78,8 +77,7 @@ class CcdParams:
         return exposure_probability(self.threshold_mps / self.sigma_mps, least_correlation(self.tau_s))
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class CcdEpoch:
+class CcdEpoch(NamedTuple):
     """Result of one epoch, by band.
 
     Attributes
@@ -109,9 +107,16 @@ class CcdEpoch:
         return upper_limit(np.abs(self.receiver_mps), self.satellites.threshold, self.settled)
 
 
-def initial_ccd(params: CcdParams, n_receivers: int) -> DivergenceState:
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CcdState:
+    """Memory of the filters, ``(5, R, N_BANDS, N)`` (:mod:`~.kernels.divergence_filter`)."""
+
+    filters: FloatArray
+
+
+def initial_ccd(n_receivers: int) -> CcdState:
     """State of a monitor that has seen nothing."""
-    return initial_divergence(params.filters, n_receivers, N_BANDS)
+    return CcdState(filters=initial_memory(n_receivers, N_BANDS))
 
 
 class Channels(Protocol):
@@ -146,55 +151,50 @@ class CcdInput(NamedTuple):
     used: BoolArray
 
 
-def ccd_step(
-    state: DivergenceState, seen: Channels, dt_s: float, params: CcdParams
-) -> tuple[DivergenceState, CcdEpoch]:
+def ccd_step(state: CcdState, seen: Channels, dt_s: float, params: CcdParams) -> tuple[CcdState, CcdEpoch]:
     """Monitor one epoch.
 
     Parameters
     ----------
-    state : DivergenceState
+    state : CcdState
         From :func:`initial_ccd` or the previous step.
     seen : Channels
     dt_s : float
         Time since the epoch before, NaN at the first [s].
     params : CcdParams
     """
-    filters, limit = params.filters, params.limit_mps
-    *memory, filtered, settled = kernels.filtered_rates(
-        state.value_m,
-        state.f1_mps,
-        state.f2_mps,
-        state.since_s,
-        state.age_s,
+    filters, shape = params.filters, seen.code_m.shape
+    memory, filtered, settled = np.empty(state.filters.shape), np.empty(shape), np.empty(shape, dtype=bool)
+    means, failed = np.empty((3, *shape[1:])), np.empty(shape[1:], dtype=bool)
+    kernels.step(
+        state.filters,
         seen.code_m,
         seen.carrier_m,
         seen.restarted,
+        seen.used,
         float(dt_s),
         float(filters.tau_s),
         float(filters.max_gap_s),
         float(filters.settle_s),
+        float(params.threshold_mps),
+        memory,
+        filtered,
+        settled,
+        means,
+        failed,
     )
-    mean, receivers, size, failed = kernels.tested(filtered, settled, seen.used, float(params.threshold_mps))
-    value_m, f1_mps, f2_mps, since_s, age_s = memory
-    new = DivergenceState(value_m=value_m, f1_mps=f1_mps, f2_mps=f2_mps, since_s=since_s, age_s=age_s)
-    return new, CcdEpoch(
-        receiver_mps=filtered,
-        settled=settled,
-        mean_mps=mean,
-        receivers=receivers,
-        satellites=MonitorResult(statistic=size, threshold=limit, failed=failed),
-    )
+    judged = MonitorResult(statistic=means[1], threshold=params.limit_mps, failed=failed)
+    return CcdState(filters=memory), CcdEpoch(filtered, settled, means[0], means[2], judged)
 
 
 # --- in the station
 
 
-def _initial(station: PreparedStation) -> DivergenceState:
-    return initial_ccd(station.ccd, station.params.n_receivers)
+def _initial(station: PreparedStation) -> CcdState:
+    return initial_ccd(station.params.n_receivers)
 
 
-def _step(state: DivergenceState, epoch: MonitoredEpoch) -> tuple[DivergenceState, MonitorOutput]:
+def _step(state: CcdState, epoch: MonitoredEpoch) -> tuple[CcdState, MonitorOutput]:
     """Corrections are on L1: its rates count."""
     inputs = epoch.inputs
     params = inputs.station.ccd

@@ -28,7 +28,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Annotated, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Final, Literal, NamedTuple
 
 import numpy as np
 
@@ -50,7 +50,7 @@ from gbas_ground.monitors.divergence_suspects import Judge, TwoFrequencyEpoch, w
 from gbas_ground.monitors.false_alarm import exposure_probability, least_correlation
 from gbas_ground.monitors.interface import MonitoredEpoch, MonitorOutput, SignalMonitor, Verdict, verdicts
 from gbas_ground.monitors.kernels import ccd_f as kernels
-from gbas_ground.monitors.kernels.divergence_filter import AGE, N_MEMORY, VALUE
+from gbas_ground.monitors.kernels.divergence_filter import initial_memory
 from gbas_ground.monitors.monitor_table import summarise
 from gbas_msgs_py.codes import Signal
 from gbas_msgs_py.monitors import CCD_F
@@ -124,18 +124,15 @@ class TwoFrequencyParams:
 
     @cached_property
     def limits(self) -> FloatArray:
-        """Thresholds of the published form and of that of full rank."""
-        return np.array([threshold(form, self.p_false_alarm) for form in ("published", "full_rank")])
-
-    @cached_property
-    def thresholds(self) -> FloatArray:
-        """The same for every satellite, ``(2, N)``."""
-        return np.repeat(self.limits[:, np.newaxis], N_SATS, axis=1)
+        """Thresholds of the published form and of that of full rank, for every satellite, ``(2, N)``."""
+        limits = [[threshold(form, self.p_false_alarm)] for form in ("published", "full_rank")]
+        return np.array(limits) * np.ones(N_SATS)
 
     @cached_property
     def published_inverse(self) -> FloatArray:
         """Of the published covariance; it is for L1 and L5 alone, and so singular only with their ratio."""
-        return PRINTED_INVERSE if (self.band, self.other) == (L1, L5) else np.full((4, 4), np.nan)
+        applies = (self.band, self.other) == (L1, L5)
+        return np.where(applies, PRINTED_INVERSE, np.nan)
 
     @property
     def band(self) -> int:
@@ -180,8 +177,7 @@ class TwoFrequencyParams:
         return exposure_probability(limit, least_correlation(tau_s), freedom=DEGREES_OF_FREEDOM[form])
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class TwoFrequencyInput:
+class TwoFrequencyInput(NamedTuple):
     """One epoch of all receivers; missing is NaN.
 
     Attributes
@@ -221,35 +217,24 @@ class TwoFrequencyState:
     filters : (3, 5, R, N) array
         Memory of the filters (:mod:`~.kernels.divergence_filter`) of DF of both bands, and of the compensated IF
         carrier's rate, less the mean of all.
-    residual_m : (R, N) array
-        Last IF carrier less geometry, satellite clock and troposphere [m].
-    clock_m : (R, N) array
-        Mean of all accumulated since then [m].
-    since_s : (R, N) array
-        Time since then [s].
+    carriers : (3, R, N) array
+        Last IF carrier less geometry, satellite clock and troposphere [m]; mean of all accumulated since then [m]; time
+        since then [s].
     rebased : (N,) bool array
         Of the last epoch.
     """
 
     filters: FloatArray
-    residual_m: FloatArray
-    clock_m: FloatArray
-    since_s: FloatArray
+    carriers: FloatArray
     rebased: BoolArray
 
 
-def initial_two_frequency(params: TwoFrequencyParams, n_receivers: int) -> TwoFrequencyState:
+def initial_two_frequency(n_receivers: int) -> TwoFrequencyState:
     """State of a monitor that has seen nothing."""
-    shape = (n_receivers, N_SATS)
-    filters = np.zeros((3, N_MEMORY, *shape))
-    filters[:, [VALUE, AGE]] = np.nan
-    return TwoFrequencyState(
-        filters=filters,
-        residual_m=np.full(shape, np.nan),
-        clock_m=np.zeros(shape),
-        since_s=np.zeros(shape),
-        rebased=np.zeros(N_SATS, dtype=bool),
-    )
+    carriers = np.zeros((3, n_receivers, N_SATS))
+    carriers[0] = np.nan
+    filters = np.stack([initial_memory(n_receivers)] * 3)
+    return TwoFrequencyState(filters=filters, carriers=carriers, rebased=np.zeros(N_SATS, dtype=bool))
 
 
 def two_frequency_step(
@@ -266,12 +251,12 @@ def two_frequency_step(
         Time since the epoch before, NaN at the first [s].
     params : TwoFrequencyParams
     """
-    filters = params.filters
-    memory, residual_m, clock_m, since_s, rates, settled = kernels.advanced(
+    filters, shape = params.filters, epoch.used.shape
+    memory, carriers = np.empty(state.filters.shape), np.empty(state.carriers.shape)
+    rates, settled = np.empty((3, *shape)), np.empty(shape, dtype=bool)
+    kernels.advanced(
         state.filters,
-        state.residual_m,
-        state.clock_m,
-        state.since_s,
+        state.carriers,
         state.rebased,
         epoch.code_m,
         epoch.carrier_m,
@@ -288,18 +273,20 @@ def two_frequency_step(
         float(filters.max_gap_s),
         float(filters.settle_s),
         float(params.zenith_delay_m),
+        memory,
+        carriers,
+        rates,
+        settled,
     )
-    new = TwoFrequencyState(
-        filters=memory, residual_m=residual_m, clock_m=clock_m, since_s=since_s, rebased=epoch.rebased
-    )
-    return new, without_suspects(Judge(rates_mps=rates, settled=settled, epoch=epoch, params=params))
+    new = TwoFrequencyState(filters=memory, carriers=carriers, rebased=epoch.rebased)
+    return new, without_suspects(Judge(rates, settled, epoch, params))
 
 
 # --- in the station
 
 
 def _initial(station: PreparedStation) -> TwoFrequencyState:
-    return initial_two_frequency(station.ccd_f, station.params.n_receivers)
+    return initial_two_frequency(station.params.n_receivers)
 
 
 def _step(state: TwoFrequencyState, epoch: MonitoredEpoch) -> tuple[TwoFrequencyState, MonitorOutput]:
@@ -332,6 +319,8 @@ def _step(state: TwoFrequencyState, epoch: MonitoredEpoch) -> tuple[TwoFrequency
 
 def _likeliest_mode(epoch: TwoFrequencyEpoch, due: BoolArray, params: TwoFrequencyParams) -> dict[str, FloatArray]:
     """Mode and its probability of the satellites that fail; missing for the rest."""
+    if not epoch.full_rank.failed.any():
+        return {}
     failed = due & epoch.full_rank.failed & np.isfinite(epoch.full_rank.statistic)
     if not failed.any():
         return {}

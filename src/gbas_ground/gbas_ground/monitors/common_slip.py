@@ -44,7 +44,8 @@ def check_common_slip(slipped: BoolArray, tracked: BoolArray, due: BoolArray) ->
     Source: ours; slips of receivers are independent, but for interference and scintillation, which end the use of the
     satellite in any case.
     """
-    number, failed = common_slips(slipped, tracked, due, _MOST_SHARE)
+    number, failed = np.empty(N_SATS), np.empty(N_SATS, dtype=bool)
+    common_slips(slipped, tracked, due, _MOST_SHARE, number, failed)
     return MonitorResult(statistic=number, threshold=_ONE, failed=failed)
 
 

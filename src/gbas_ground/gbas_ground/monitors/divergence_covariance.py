@@ -157,8 +157,8 @@ class StatisticCovariance:
         (N, 3, 3) array
             [(m/s)^2].
         """
-        given = (np.array(each, dtype=np.float64) for each in (elevation_rad, receivers, clock_satellites))
-        found: FloatArray = covariances(*given, *self.tables)
+        elevation, number, others = np.array([elevation_rad, receivers, clock_satellites], dtype=np.float64)
+        found: FloatArray = covariances(elevation, number, others, *self.tables)
         return found
 
     @cached_property

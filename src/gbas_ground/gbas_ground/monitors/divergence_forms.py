@@ -66,4 +66,5 @@ def full_rank_form(rates_mps: FloatArray, covariance: FloatArray) -> FloatArray:
     rates_mps : (3, N) array
     covariance : (N, 3, 3) array
     """
-    return chi_squares(np.ascontiguousarray(rates_mps), np.ascontiguousarray(covariance))
+    found: FloatArray = chi_squares(np.ascontiguousarray(rates_mps), np.ascontiguousarray(covariance))
+    return found

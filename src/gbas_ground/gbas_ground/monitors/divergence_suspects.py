@@ -9,8 +9,7 @@ is that of both.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -28,10 +27,10 @@ _MOST_SUSPECTS: Final = 4
 # Uncertain, ours: of the threshold; a satellite that is in no clock costs little, a faulty one that is in them much.
 _SUSPICION: Final = 0.5
 _ALL: Final = np.ones((1, N_SATS), dtype=bool)
+_NOBODY: Final = np.zeros(N_SATS, dtype=bool)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class TwoFrequencyEpoch:
+class TwoFrequencyEpoch(NamedTuple):
     """Result of one epoch.
 
     Attributes
@@ -63,8 +62,7 @@ class TwoFrequencyEpoch:
     full_rank: MonitorResult
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Judge:
+class Judge(NamedTuple):
     """What satellites are judged by at one epoch.
 
     Attributes
@@ -85,40 +83,44 @@ class Judge:
     def verdict(self, suspect: BoolArray) -> TwoFrequencyEpoch:
         """Statistics and verdicts with receiver clocks that do without the satellites under suspicion, ``(N,)``."""
         epoch, params = self.epoch, self.params
-        clock, others = kernels.clocks(
-            self.rates_mps[2], self.settled, epoch.clock_used, suspect, CLOCK_GROUPS, _ALL, params.min_clock_satellites
-        )
-        receiver, counts, means, receivers, clock_satellites, covariance, statistic, failed = kernels.judged(
+        receiver, counts = np.empty(self.rates_mps.shape), np.empty(self.settled.shape, dtype=bool)
+        found, failed = np.empty((8, N_SATS)), np.empty((2, N_SATS), dtype=bool)
+        covariance = np.empty((N_SATS, 3, 3))
+        kernels.judge(
             self.rates_mps,
             self.settled,
-            clock,
-            others,
             epoch.used,
+            epoch.clock_used,
+            suspect,
+            CLOCK_GROUPS,
+            _ALL,
+            params.min_clock_satellites,
             epoch.elevation_rad,
             *params.covariance.tables,
             params.published_inverse,
             params.weights,
             params.limits,
-        )
-        published, full_rank = (
-            MonitorResult(statistic=statistic[form], threshold=params.thresholds[form], failed=failed[form])
-            for form in range(2)
+            receiver,
+            counts,
+            found,
+            covariance,
+            failed,
         )
         return TwoFrequencyEpoch(
             receiver_mps=receiver,
             settled=counts,
-            mean_mps=means,
-            receivers=receivers,
-            clock_satellites=clock_satellites,
+            mean_mps=found[:4],
+            receivers=found[4],
+            clock_satellites=found[5],
             covariance=covariance,
-            published=published,
-            full_rank=full_rank,
+            published=MonitorResult(statistic=found[6], threshold=params.limits[0], failed=failed[0]),
+            full_rank=MonitorResult(statistic=found[7], threshold=params.limits[1], failed=failed[1]),
         )
 
 
 def without_suspects(judge: Judge) -> TwoFrequencyEpoch:
     """Judge one epoch; what fails for another satellite's sake, through the clock, does not."""
-    suspect = np.zeros(N_SATS, dtype=bool)
+    suspect = _NOBODY
     result = judge.verdict(suspect)
     if not result.full_rank.failed.any():
         return result
@@ -148,7 +150,7 @@ def _apart(result: TwoFrequencyEpoch, judge: Judge) -> BoolArray:
     there = np.isfinite(deviation)
     mean = np.where(there, deviation, 0.0).sum(axis=0) / np.maximum(there.sum(axis=0), 1)
     variance = result.covariance[:, 2, 2]
-    return np.asarray(mean**2 > _SUSPICION**2 * judge.params.limits[1] * variance)
+    return np.asarray(mean**2 > _SUSPICION**2 * judge.params.limits[1, 0] * variance)
 
 
 def _explains(without: TwoFrequencyEpoch, result: TwoFrequencyEpoch, rest: BoolArray, share: float) -> bool:

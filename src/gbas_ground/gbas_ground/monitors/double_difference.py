@@ -23,13 +23,13 @@ eq (1) and (2); Khanafseh, Yang, Pervan, ION GNSS 2010. The choice of reference 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
 from gbas_core.gnss.frames import geodetic_from_ecef, rot_enu_ecef
 from gbas_core.record import BoolArray, FloatArray, IntArray
-from gbas_core.satellites import CLOCK_GROUPS
+from gbas_core.satellites import CLOCK_GROUPS, N_SATS
 from gbas_core.signals import WAVELENGTH_M
 from gbas_ground.monitors.carrier_noise import CarrierNoise
 from gbas_ground.monitors.kernels import double_difference as kernels
@@ -134,13 +134,11 @@ class Troposphere:
 
         Source: :func:`~gbas_ground.monitors.kernels.double_difference.slant_delays_m`.
         """
-        return kernels.slant_delays_m(
-            np.array(elevation_rad, dtype=np.float64),
-            np.array(azimuth_rad, dtype=np.float64),
-            place_m,
-            float(self.refractivity),
-            float(self.scale_height_m),
+        delay = np.empty((len(place_m), len(elevation_rad)))
+        kernels.slant_delays_m(
+            elevation_rad, azimuth_rad, place_m, float(self.refractivity), float(self.scale_height_m), delay
         )
+        return delay
 
 
 def carrier_residual_m(
@@ -168,8 +166,9 @@ def carrier_residual_m(
     (R, F, N) array
         Receiver clock, ambiguity and minus the ionosphere [m].
     """
-    given = (np.ascontiguousarray(each) for each in (carrier_m, range_m, clock_s, delay_m))
-    return kernels.residuals_m(*given, np.array(bands))
+    residual = np.empty((len(carrier_m), len(bands), carrier_m.shape[-1]))
+    kernels.residuals_m(carrier_m, range_m, clock_s, delay_m, np.array(bands), residual)
+    return residual
 
 
 def reference_satellites(may_refer: BoolArray, elevation_rad: FloatArray, count: int) -> IntArray:
@@ -183,11 +182,12 @@ def reference_satellites(may_refer: BoolArray, elevation_rad: FloatArray, count:
     count : int
         Most reference satellites of one constellation.
     """
-    return kernels.highest(may_refer, elevation_rad, CLOCK_GROUPS, count)
+    found = np.empty((N_SATS, count), dtype=np.int64)
+    kernels.highest(may_refer, elevation_rad, CLOCK_GROUPS, found)
+    return found
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class DoubleDifferences:
+class DoubleDifferences(NamedTuple):
     """One value a baseline, band and satellite: that against the middle one of its reference satellites.
 
     Attributes
@@ -236,14 +236,17 @@ def double_differences(
     satellites share is found on both, and nobody else is blamed; in general with (P - 1) / 2. Fewer references than
     that, and it is the others that fail. A satellite with a single reference shares its verdict.
     """
-    factors, sigma_m = noise.factors(len(residual_m)), noise.sigma_m(elevation_rad, bands)
-    left_m, sigma_m, nominal_m, reference = kernels.middle(
+    shape = (len(baselines), *residual_m.shape[1:])
+    found, reference = np.empty((3, *shape)), np.empty(shape, dtype=np.int64)
+    kernels.middle(
         np.ascontiguousarray(residual_m),
         baselines.first,
         baselines.second,
-        factors,
-        sigma_m,
+        noise.factors(len(residual_m)),
+        noise.sigma_m(elevation_rad, bands),
         references,
         WAVELENGTH_M.take(bands),
+        found,
+        reference,
     )
-    return DoubleDifferences(residual_m=left_m, sigma_m=sigma_m, nominal_sigma_m=nominal_m, reference=reference)
+    return DoubleDifferences(residual_m=found[0], sigma_m=found[1], nominal_sigma_m=found[2], reference=reference)

@@ -28,7 +28,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import combinations
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final, NamedTuple
 
 import numpy as np
 from scipy.special import ndtri
@@ -42,6 +42,7 @@ from gbas_ground.monitors.double_difference import Baselines, DoubleDifferences
 from gbas_ground.monitors.false_alarm import FALSE_EXCLUSION, false_alarm_multiplier
 from gbas_ground.monitors.interface import MonitoredEpoch, MonitorOutput, SignalMonitor, verdicts
 from gbas_ground.monitors.kernels import double_difference as kernels
+from gbas_ground.monitors.kernels.carrier_noise import differenced_sigma_m
 from gbas_ground.monitors.monitor_table import signal_of, summarise
 from gbas_ground.monitors.result import MonitorResult
 from gbas_msgs_py.monitors import EPHEMERIS_RESIDUAL
@@ -105,48 +106,50 @@ class EphemerisResidualState:
 
     Attributes
     ----------
-    followed_m : (B, F, N) array
-        [m]; NaN where there is none.
-    unseen_s : (B, F, N) array
-        Time since each was last there; NaN if it never was [s].
+    followed : (2, B, F, N) array
+        Double differences [m], NaN where there is none; time since each was last there, NaN if it never was [s].
     """
 
-    followed_m: FloatArray
-    unseen_s: FloatArray
+    followed: FloatArray
 
 
 def initial_ephemeris_residual(n_baselines: int, params: EphemerisResidualParams) -> EphemerisResidualState:
     """A monitor that has seen nothing."""
-    nothing = np.full((n_baselines, len(params.bands), N_SATS), np.nan)
-    return EphemerisResidualState(followed_m=nothing, unseen_s=nothing)
+    return EphemerisResidualState(followed=np.full((2, n_baselines, len(params.bands), N_SATS), np.nan))
+
+
+class Orbits(NamedTuple):
+    """What the monitor looks at, at one epoch.
+
+    Attributes
+    ----------
+    differences : DoubleDifferences
+        Of the baselines and `params.bands`.
+    due : (N,) bool array
+        Satellites that must be monitored.
+    shift_m : (R, N) array, optional
+        What a new ephemeris changes in the residuals of this epoch, as for
+        :class:`~gbas_ground.monitors.carrier_acceleration.Carriers` [m].
+    """
+
+    differences: DoubleDifferences
+    due: BoolArray
+    shift_m: FloatArray | None = None
 
 
 def ephemeris_residual_step(
-    state: EphemerisResidualState,
-    differences: DoubleDifferences,
-    baselines: Baselines,
-    due: BoolArray,
-    dt_s: float,
-    params: EphemerisResidualParams,
-    *,
-    shift_m: FloatArray | None = None,
+    state: EphemerisResidualState, seen: Orbits, baselines: Baselines, dt_s: float, params: EphemerisResidualParams
 ) -> tuple[EphemerisResidualState, MonitorResult]:
     """Follow and test one epoch.
 
     Parameters
     ----------
     state : EphemerisResidualState
-    differences : DoubleDifferences
-        Of `baselines` and `params.bands`.
+    seen : Orbits
     baselines : Baselines
-    due : (N,) bool array
-        Satellites that must be monitored.
     dt_s : float
         Time since the epoch before [s]; NaN at the first.
     params : EphemerisResidualParams
-    shift_m : (R, N) array, optional
-        What a new ephemeris changes in the residuals of this epoch, as for
-        :func:`~gbas_ground.monitors.carrier_acceleration.carrier_acceleration_step` [m].
 
     Returns
     -------
@@ -154,22 +157,26 @@ def ephemeris_residual_step(
     result : MonitorResult
         ``(N,)``: size of the double difference of the baseline and band that is worst, and its threshold [m].
     """
-    followed_m, unseen_s, statistic, limit, failed = kernels.followed(
-        state.followed_m,
-        state.unseen_s,
-        differences.residual_m,
-        differences.sigma_m,
+    followed, found = np.empty(state.followed.shape), np.empty((2, len(seen.due)))
+    failed = np.empty(len(seen.due), dtype=bool)
+    kernels.follow(
+        state.followed,
+        seen.differences.residual_m,
+        seen.differences.sigma_m,
         baselines.first,
         baselines.second,
-        np.zeros((len(baselines.place_m), N_SATS)) if shift_m is None else shift_m,
-        due,
+        np.zeros((len(baselines.place_m), N_SATS)) if seen.shift_m is None else seen.shift_m,
+        seen.due,
         float(dt_s),
         float(params.max_gap_s),
         params.multiplier(len(baselines)),
         WAVELENGTH_M.take(params.bands),
+        followed,
+        found,
+        failed,
     )
-    new = EphemerisResidualState(followed_m=followed_m, unseen_s=unseen_s)
-    return new, MonitorResult(statistic=statistic, threshold=limit, failed=failed)
+    new = EphemerisResidualState(followed=followed)
+    return new, MonitorResult(statistic=found[0], threshold=found[1], failed=failed)
 
 
 def decorrelation(
@@ -280,7 +287,7 @@ def assumed_sigma_m(
     scale = np.hypot(factors[baselines.first], factors[baselines.second])[:, np.newaxis]
     sigma = noise.sigma_m(elevation_rad, params.bands[:1])
     reference = noise.sigma_m(np.array([reference_elevation_rad]), params.bands[:1])
-    return np.asarray(scale * np.hypot(sigma, reference))
+    return np.asarray(differenced_sigma_m.py_func(scale, sigma, reference))  # type: ignore[attr-defined]
 
 
 # --- in the station
@@ -294,9 +301,8 @@ def _step(state: EphemerisResidualState, epoch: MonitoredEpoch) -> tuple[Ephemer
     """Satellites whose orbits are not bounded are not ready where that is required."""
     inputs, station = epoch.inputs, epoch.inputs.station
     baselines, params = station.gradient_site.baselines, station.ephemeris_residual
-    state, result = ephemeris_residual_step(
-        state, epoch.fitting.differences, baselines, inputs.due, inputs.dt_s, params, shift_m=inputs.shift_m
-    )
+    seen = Orbits(epoch.fitting.differences, inputs.due, inputs.shift_m)
+    state, result = ephemeris_residual_step(state, seen, baselines, inputs.dt_s, params)
     due, test = inputs.due & (len(baselines) > 0), EPHEMERIS_RESIDUAL.test("residual")
     return state, MonitorOutput(
         summaries={EPHEMERIS_RESIDUAL.key(test.name): summarise(result, due, signal_of(params.bands))},

@@ -16,13 +16,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from gbas_core.parameters import Derived, Parameter, ParameterError, parameters
-from gbas_core.record import BoolArray, FloatArray
+from gbas_core.record import BoolArray, FloatArray, IntArray
 from gbas_core.satellites import N_SATS
 from gbas_core.signals import L1, L5, N_BANDS
 from gbas_ground.monitors.false_alarm import EPOCH_S, FALSE_EXCLUSION, false_alarm_multiplier
@@ -94,10 +94,10 @@ class PowerExpectationParams:
         return (self.minimum_l1_dbhz, self.minimum_l2_dbhz, self.minimum_l5_dbhz)
 
     @cached_property
-    def table(self) -> tuple[FloatArray, FloatArray]:
-        """Nodes ``(K,)`` [rad] and minimum of the bands tested ``(F, K)`` [dB-Hz]."""
+    def tables(self) -> tuple[IntArray, FloatArray, FloatArray]:
+        """Bands tested ``(F,)``, nodes ``(K,)`` [rad] and their minimum ``(F, K)`` [dB-Hz]."""
         values = [self.minimum_dbhz[band] for band in self.bands]
-        return np.array(self.elevation_rad, dtype=np.float64), np.array(values, dtype=np.float64)
+        return np.array(self.bands), np.array(self.elevation_rad, dtype=float), np.array(values, dtype=float)
 
 
 def minimum_from_expectation(
@@ -131,35 +131,23 @@ class PowerExpectationState:
 
     Attributes
     ----------
-    mean_dbhz : (R, F, N) array
-        Averaged C/N0; NaN where there is none.
-    unseen_s : (R, F, N) array
-        Time since C/N0 was last there; NaN if it never was [s].
-    learnt_dbhz : (R, F, E) array
-        Mean C/N0 in each bin of elevation.
-    learnt_s : (R, F, E) array
-        Time learnt [s].
+    averages : (2, R, F, N) array
+        Averaged C/N0, NaN where there is none; time since C/N0 was last there, NaN if it never was [s].
+    learnt : (2, R, F, E) array
+        Mean C/N0 in each bin of elevation; time learnt [s].
     """
 
-    mean_dbhz: FloatArray
-    unseen_s: FloatArray
-    learnt_dbhz: FloatArray
-    learnt_s: FloatArray
+    averages: FloatArray
+    learnt: FloatArray
 
 
 def initial_power_expectation(n_receivers: int, params: PowerExpectationParams) -> PowerExpectationState:
     """A monitor that has seen nothing."""
-    shape, bins = (n_receivers, len(params.bands), N_SATS), (n_receivers, len(params.bands), N_BINS)
-    return PowerExpectationState(
-        mean_dbhz=np.full(shape, np.nan),
-        unseen_s=np.full(shape, np.nan),
-        learnt_dbhz=np.zeros(bins),
-        learnt_s=np.zeros(bins),
-    )
+    leading = (2, n_receivers, len(params.bands))
+    return PowerExpectationState(averages=np.full((*leading, N_SATS), np.nan), learnt=np.zeros((*leading, N_BINS)))
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class PowerExpectationResult:
+class PowerExpectationResult(NamedTuple):
     """Minus C/N0, so that larger is worse like everywhere, and minus the minimum [dB-Hz].
 
     Attributes
@@ -203,34 +191,38 @@ def power_expectation_step(
         A channel that fails alone still has a part in the average: that its own power is low lowers the mean of four
         receivers by a quarter of it, and the table's margin has to pass that.
     """
-    bands, dt_s = np.array(params.bands), float(dt_s)
-    now, mean, unseen = kernels.averaged(
-        state.mean_dbhz, state.unseen_s, cn0_dbhz, bands, dt_s, float(params.average_s), float(params.max_gap_s)
-    )
-    channels, channels_failed, wanted, satellites, satellites_failed = kernels.tested(
-        now,
+    _, n_bands, n_sats = shape = state.averages.shape[1:]
+    averages, learnt = np.empty(state.averages.shape), state.learnt
+    channels, channels_failed = np.empty((2, *shape)), np.empty(shape, dtype=bool)
+    satellites, satellites_failed = np.empty((2, n_bands, n_sats)), np.empty((n_bands, n_sats), dtype=bool)
+    bands, dt_s = params.tables[0], float(dt_s)
+    kernels.step(
+        state.averages,
+        learnt,
         cn0_dbhz,
-        bands,
         due,
         elevation_rad,
-        *params.table,
+        *params.tables,
         float(params.channel_margin_db),
         bool(params.learn),
         float(params.drop_db),
         float(params.learnt_after_s),
-        state.learnt_dbhz,
-        state.learnt_s,
         BIN_RAD,
+        dt_s,
+        float(params.average_s),
+        float(params.max_gap_s),
+        averages,
+        channels,
+        channels_failed,
+        satellites,
+        satellites_failed,
     )
-    learnt = (state.learnt_dbhz, state.learnt_s)
     if params.learn and 0.0 < dt_s <= params.max_gap_s:
-        failed = (channels_failed, satellites_failed)
-        learnt = kernels.taught(
-            *learnt, cn0_dbhz, bands, wanted, *failed, elevation_rad, dt_s, float(params.learn_s), BIN_RAD
+        failed, learnt = (channels_failed, satellites_failed), np.empty(learnt.shape)
+        kernels.teach(
+            state.learnt, cn0_dbhz, bands, due, *failed, elevation_rad, dt_s, float(params.learn_s), BIN_RAD, learnt
         )
-    return PowerExpectationState(
-        mean_dbhz=mean, unseen_s=unseen, learnt_dbhz=learnt[0], learnt_s=learnt[1]
-    ), PowerExpectationResult(
+    return PowerExpectationState(averages=averages, learnt=learnt), PowerExpectationResult(
         channels=MonitorResult(statistic=channels[0], threshold=channels[1], failed=channels_failed),
         satellites=MonitorResult(statistic=satellites[0], threshold=satellites[1], failed=satellites_failed),
     )
@@ -246,8 +238,9 @@ def _initial(station: PreparedStation) -> PowerExpectationState:
 def _step(state: PowerExpectationState, epoch: MonitoredEpoch) -> tuple[PowerExpectationState, MonitorOutput]:
     """A receiver that gives no C/N0 fails where the station requires it, and is not looked at otherwise."""
     inputs, params = epoch.inputs, epoch.inputs.station.expected_power
-    given = np.isfinite(inputs.cn0_dbhz[:, L1])
-    due = inputs.ready & inputs.due & (given | inputs.station.params.signal_power.require_cn0)
+    due = inputs.ready & inputs.due
+    if not inputs.station.params.signal_power.require_cn0:
+        due = due & np.isfinite(inputs.cn0_dbhz[:, L1])
     state, found = power_expectation_step(
         state, inputs.cn0_dbhz, due, inputs.predicted.elevation_rad, inputs.dt_s, params
     )

@@ -169,12 +169,12 @@ def best_tests(
     band are taken as its worst baseline's, relative to the receivers' noise, rounded up: few values that come again and
     again, so that most are known, and mostly those of the epoch before.
     """
-    code = kernels.seen(residual_m, residual_m.shape[1])
-    steps = kernels.noise_steps(residual_m, nominal_sigma_m, site.scale, _PER_STEP)
-    key = code.tobytes() + steps.tobytes()
+    sky = np.empty((1 + residual_m.shape[1], residual_m.shape[2]), dtype=np.int64)
+    kernels.sky(residual_m, nominal_sigma_m, site.scale, _PER_STEP, sky)
+    key = sky.tobytes()
     if key not in site._latest:
         site._latest.clear()
-        site._latest[key] = _of_all(code, steps, site, params)
+        site._latest[key] = _of_all(sky[0], sky[1:], site, params)
     return site._latest[key]
 
 
@@ -271,5 +271,6 @@ def blind_gradients(
     sigma = np.ascontiguousarray(differences.nominal_sigma_m[..., [satellite]])
     residual = np.ascontiguousarray(differences.residual_m[..., [satellite]])
     (place,), _ = best_tests(residual, sigma, site, params)
-    (code,) = kernels.seen(residual, len(params.bands)).tolist()
-    return _blind(code, sigma[..., 0], site.tests[place], site.length_m[runway], site, params)
+    code = np.empty(1, dtype=np.int64)
+    kernels.seen(residual, len(params.bands), code)
+    return _blind(int(code[0]), sigma[..., 0], site.tests[place], site.length_m[runway], site, params)

@@ -8,7 +8,7 @@ parameters, its memory before the first epoch, and its step. The station runs th
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
@@ -17,8 +17,8 @@ import numpy as np
 from gbas_core.ranging.predicted_ranges import PredictedRanges
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import CLOCK_GROUPS
-from gbas_core.signals import BANDS
 from gbas_ground.monitors.double_difference import carrier_residual_m
+from gbas_ground.monitors.kernels.ranges import common_channels
 from gbas_ground.monitors.monitor_table import Summaries
 from gbas_ground.monitors.receiver_baselines import FittingDifferences, fitting_differences, quiet_receivers
 from gbas_ground.monitors.result import MonitorResult
@@ -28,7 +28,7 @@ from gbas_msgs_py.monitors import Monitor
 if TYPE_CHECKING:
     from gbas_ground.prepared import PreparedStation
 
-_ALL_BANDS: Final = tuple(range(len(BANDS)))
+_NOTHING: Final[Mapping[str, Any]] = {}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -79,13 +79,24 @@ class MonitorInputs:
     shift_m: FloatArray
     dt_s: float
 
+    def residual_of(self, bands: tuple[int, ...]) -> FloatArray:
+        """Carriers of some bands without what is expected of them, ``(R, F, N)`` [m]."""
+        if bands not in self._residuals:
+            predicted = self.predicted
+            expected = predicted.range_m, predicted.clock_s, self._delay_m
+            self._residuals[bands] = carrier_residual_m(self.carrier_m, *expected, bands)
+        return self._residuals[bands]
+
     @cached_property
-    def residual_m(self) -> FloatArray:
-        """Carriers of all bands without what is expected of them, ``(R, N_BANDS, N)`` [m]."""
-        predicted, station = self.predicted, self.station
+    def _residuals(self) -> dict[tuple[int, ...], FloatArray]:
+        return {}
+
+    @cached_property
+    def _delay_m(self) -> FloatArray:
+        """Of the troposphere, ``(R, N)`` [m]."""
+        station, predicted = self.station, self.predicted
         place_m = station.gradient_site.baselines.place_m
-        delay_m = station.troposphere.delay_m(predicted.elevation_rad, predicted.azimuth_rad, place_m)
-        return carrier_residual_m(self.carrier_m, predicted.range_m, predicted.clock_s, delay_m, _ALL_BANDS)
+        return station.troposphere.delay_m(predicted.elevation_rad, predicted.azimuth_rad, place_m)
 
 
 @dataclass(eq=False)
@@ -109,10 +120,10 @@ class MonitoredEpoch:
         A channel that jumped alone must not make a gradient of its satellite, nor what is left of a receiver's channels
         when there are not enough of them.
         """
-        ready = self.inputs.ready
-        number = ready.astype(np.int64) @ CLOCK_GROUPS.T.astype(np.int64)
-        enough = (number >= self.inputs.station.params.monitors.min_common_satellites) @ CLOCK_GROUPS
-        return ready & enough & ~self.failed
+        steady = np.empty(self.failed.shape, dtype=bool)
+        least = self.inputs.station.params.monitors.min_common_satellites
+        common_channels(self.inputs.ready, self.failed, CLOCK_GROUPS, least, steady)
+        return steady
 
     @cached_property
     def fitting(self) -> FittingDifferences:
@@ -147,8 +158,7 @@ class Verdict(NamedTuple):
     power: int = 0
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class MonitorOutput:
+class MonitorOutput(NamedTuple):
     """What a monitor has to say.
 
     Attributes
@@ -162,7 +172,7 @@ class MonitorOutput:
     """
 
     summaries: Summaries
-    details: Mapping[str, Any] = field(default_factory=dict)
+    details: Mapping[str, Any] = _NOTHING
     satellites: tuple[Verdict, ...] = ()
     channels: tuple[Verdict, ...] = ()
     ready: BoolArray | None = None
@@ -200,5 +210,4 @@ def verdicts(
     """The failures of satellites that are due, unless the monitor is only watched."""
     if not exclude:
         return ()
-    judged = MonitorResult(statistic=result.statistic, threshold=result.threshold, failed=result.failed & due)
-    return (Verdict(cause, judged, power),)
+    return (Verdict(cause, MonitorResult(result.statistic, result.threshold, result.failed & due), power),)

@@ -24,15 +24,14 @@ L1 grows in the direction of the runway's bearing.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, NamedTuple
 
 import numpy as np
 
 from gbas_core.parameters import Derived, Parameter, ParameterError, parameters
 from gbas_core.record import BoolArray, FloatArray, IntArray
-from gbas_core.satellites import missing
+from gbas_core.satellites import N_SATS, missing
 from gbas_core.signals import BAND_INDEX, L1, L5, WAVELENGTH_M, Band
 from gbas_ground.monitors.carrier_noise import CarrierNoise
 from gbas_ground.monitors.double_difference import DoubleDifferences, Pairing
@@ -43,7 +42,7 @@ from gbas_ground.monitors.gradient_estimates import gradient_set
 from gbas_ground.monitors.interface import MonitoredEpoch, MonitorOutput, SignalMonitor, no_memory, verdicts
 from gbas_ground.monitors.kernels import gradient as kernels
 from gbas_ground.monitors.monitor_table import signal_of, summarise
-from gbas_ground.monitors.result import MonitorResult
+from gbas_ground.monitors.result import MonitorResult, upper_limit
 from gbas_msgs_py.monitors import IONOSPHERE_GRADIENT
 from gbas_msgs_py.records import BASELINES
 
@@ -98,16 +97,13 @@ class IonosphereGradientParams:
         return np.asarray(0.5 * WAVELENGTH_M.take(self.bands))
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class GradientResult:
+class GradientResult(NamedTuple):
     """What the monitor found.
 
     Attributes
     ----------
     verdict : MonitorResult
         ``(N,)``: statistic and threshold of the baseline and band that decided [m].
-    by_baseline : MonitorResult
-        ``(B, F, N)``: each baseline and band for itself; its `failed` has no part of `params.fuse`.
     monitored : (N,) bool array
         Satellites with a statistic that can detect something, and enough of `params.gradient_range`.
     coverage : (N,) array
@@ -121,7 +117,6 @@ class GradientResult:
     """
 
     verdict: MonitorResult
-    by_baseline: MonitorResult
     monitored: BoolArray
     coverage: FloatArray
     chosen: IntArray
@@ -148,7 +143,8 @@ def check_ionosphere_gradient(
         Satellites are what fails: a double difference does not tell a gradient from a fault of one channel.
     """
     chosen, coverage = best_tests(differences.residual_m, differences.nominal_sigma_m, site, params)
-    statistic, threshold, failed, decided, limit, exceeded = kernels.tested(
+    found, exceeded = np.empty((2, len(due))), np.empty(len(due), dtype=bool)
+    kernels.test(
         differences.residual_m,
         differences.sigma_m,
         chosen,
@@ -157,34 +153,42 @@ def check_ionosphere_gradient(
         params.half_wavelength_m,
         params.fuse == "all",
         due,
+        found,
+        exceeded,
     )
-    looked = np.isfinite(decided)
-    return GradientResult(
-        verdict=MonitorResult(statistic=decided, threshold=limit, failed=exceeded),
-        by_baseline=MonitorResult(statistic=statistic, threshold=threshold, failed=failed),
+    looked = np.isfinite(found[0])
+    result = GradientResult(
+        verdict=MonitorResult(statistic=found[0], threshold=found[1], failed=exceeded),
         monitored=looked & (coverage > 0.0) & (coverage >= params.min_coverage),
         coverage=coverage,
         chosen=chosen,
-        gradient=_smallest_gradients(exceeded, differences, statistic, site.length_m[0], params.bands),
+        gradient=missing(),
     )
-
-
-def _smallest_gradients(
-    exceeded: BoolArray,
-    differences: DoubleDifferences,
-    statistic_m: FloatArray,
-    length_m: FloatArray,
-    bands: tuple[int, ...],
-) -> FloatArray:
-    """First of :func:`gradient_set` for the satellites that exceeded a threshold, (N,); NaN for the others."""
-    result = np.full(exceeded.shape, np.nan)
-    for satellite in np.flatnonzero(exceeded):
-        looked = np.isfinite(statistic_m[..., satellite])
-        own = np.where(looked, differences.residual_m[..., satellite], np.nan)
-        explained = gradient_set(own, differences.sigma_m[..., satellite], length_m, bands)
-        if explained.size:
-            result[satellite] = explained[0]
+    if exceeded.any():
+        _explain(result, differences, site, params)
     return result
+
+
+def by_baseline(
+    result: GradientResult, differences: DoubleDifferences, site: GradientSite, params: IonosphereGradientParams
+) -> MonitorResult:
+    """Each baseline and band for itself, ``(B, F, N)``; what failed has no part of `params.fuse`."""
+    threshold = site.multipliers[result.chosen] * differences.sigma_m
+    possible = threshold < params.half_wavelength_m[:, np.newaxis]
+    looked = np.isfinite(differences.residual_m) & site.masks[result.chosen].T & possible
+    return upper_limit(np.where(looked, np.abs(differences.residual_m), np.nan), threshold, looked)
+
+
+def _explain(
+    result: GradientResult, differences: DoubleDifferences, site: GradientSite, params: IonosphereGradientParams
+) -> None:
+    """Fill in the first of :func:`gradient_set` for the satellites that exceeded a threshold."""
+    looked = np.isfinite(by_baseline(result, differences, site, params).statistic)
+    for satellite in np.flatnonzero(result.verdict.failed):
+        own = np.where(looked[..., satellite], differences.residual_m[..., satellite], np.nan)
+        explained = gradient_set(own, differences.sigma_m[..., satellite], site.length_m[0], params.bands)
+        if explained.size:
+            result.gradient[satellite] = explained[0]
 
 
 # --- in the station
@@ -210,8 +214,8 @@ def _details(
     details: dict[str, Any] = {"gradient": found.gradient, "gradient_coverage": found.coverage}
     for name, band in (("double_difference_m", L1), ("double_difference_l5_m", L5)):
         if band in bands:
-            details[name] = missing(len(BASELINES))
-            details[name][site.rows] = differences.residual_m[:, bands.index(band)]
+            details[name] = np.empty((len(BASELINES), N_SATS))
+            kernels.spread(differences.residual_m, bands.index(band), site.rows, details[name])
     return details
 
 

@@ -88,31 +88,31 @@ def summarise(result: MonitorResult, due: BoolArray, signal: Signal = Signal.L1)
         Statistic and threshold are those of the comparison that is furthest over its threshold, or nearest to it.
     """
     expected = due if due.ndim == 1 else np.logical_or.reduce(due.reshape(-1, N_SATS))
-    statistic, threshold, failed = result.statistic, result.threshold, result.failed
-    if statistic.ndim > 1:
-        statistic, threshold, failed = (each[0] for each in _worst_of_each(result, 1))
-    elif threshold.ndim == 0:
+    if result.statistic.ndim > 1:
+        worst, failed = _worst_of_each(result, 1)
+        return MonitorSummary(worst[0, 0], worst[1, 0], failed[0], expected, signal)
+    statistic, threshold, failed = result
+    if threshold.ndim == 0:
         threshold = np.full(statistic.shape, threshold)
     return MonitorSummary(statistic, threshold, failed, expected, signal)
 
 
 def summarise_each(result: MonitorResult, due: BoolArray, signal: Signal = Signal.L1) -> tuple[MonitorSummary, ...]:
     """The same of several tests, which are the first axis of the result; `due` is ``(N,)``."""
-    worst = _worst_of_each(result, len(result.statistic))
-    return tuple(MonitorSummary(*each, due, signal) for each in zip(*worst, strict=True))
+    count = len(result.statistic)
+    worst, failed = _worst_of_each(result, count)
+    return tuple([MonitorSummary(worst[0, test], worst[1, test], failed[test], due, signal) for test in range(count)])
 
 
-def _worst_of_each(result: MonitorResult, count: int) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """Statistic, threshold and verdict of the worst of each of so many tests, ``(count, N)``."""
-    shape = result.statistic.shape
-    threshold = result.threshold
-    if threshold.shape != shape:
-        threshold = np.array(np.broadcast_to(threshold, shape))
-    parts = (result.statistic, threshold, result.failed)
-    found: tuple[FloatArray, FloatArray, BoolArray] = worst_along(
-        *(np.ascontiguousarray(each).reshape(count, -1, N_SATS) for each in parts)
-    )
-    return found
+def _worst_of_each(result: MonitorResult, count: int) -> tuple[FloatArray, BoolArray]:
+    """Statistic and threshold of the worst ``(2, count, N)`` of each of so many tests, and whether any failed."""
+    statistic, threshold, failed = result
+    if threshold.shape != statistic.shape:
+        threshold = np.array(np.broadcast_to(threshold, statistic.shape))
+    shape = count, -1, N_SATS
+    worst, fails = np.empty((2, count, N_SATS)), np.empty((count, N_SATS), dtype=bool)
+    worst_along(statistic.reshape(shape), threshold.reshape(shape), failed.reshape(shape), worst, fails)
+    return worst, fails
 
 
 def monitor_epoch(gps_week: int, tow_s: float, summaries: Summaries, shown: BoolArray) -> MonitorEpoch:

@@ -71,7 +71,7 @@ def _double_differences(channels: BoolArray, inputs: MonitorInputs, station: Pre
     """Of the channels given, over all baselines."""
     params, elevation_rad = station.ionosphere_gradient, inputs.predicted.elevation_rad
     references = reference_satellites(inputs.may_refer, elevation_rad, params.references)
-    used_m = np.where(channels[:, np.newaxis], inputs.residual_m.take(params.bands, axis=1), np.nan)
+    used_m = np.where(channels[:, np.newaxis], inputs.residual_of(params.bands), np.nan)
     baselines = station.gradient_site.baselines
     return double_differences(used_m, baselines, references, elevation_rad, params.noise, params.bands)
 

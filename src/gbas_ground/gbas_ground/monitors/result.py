@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from gbas_core.record import BoolArray, FloatArray
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class MonitorResult:
+class MonitorResult(NamedTuple):
     """Statistic, threshold and verdict of one monitor at one epoch.
 
     Attributes

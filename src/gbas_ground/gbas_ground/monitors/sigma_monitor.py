@@ -35,7 +35,8 @@ from gbas_core.parameters import Parameter, ParameterError, parameters
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import N_SATS
 from gbas_ground.monitors.false_alarm import EXPOSURE_S, FALSE_EXCLUSION
-from gbas_ground.monitors.result import MonitorResult, upper_limit
+from gbas_ground.monitors.kernels import sigma as kernels
+from gbas_ground.monitors.result import MonitorResult
 
 _ROOT_2_PI: Final = float(np.sqrt(2.0 * np.pi))
 
@@ -127,9 +128,10 @@ def quadratic_quantile(eigenvalues: FloatArray, probability: float, freedom: int
 class _Tables(NamedTuple):
     """Thresholds by the number of samples: those of a number count until the next one in `counts` is reached."""
 
+    steady: FloatArray  # (W,), weight of a sample once a window is full
+    full: FloatArray  # (W,), samples that fill it
     counts: FloatArray  # (G,)
-    mean: FloatArray  # (W, T, G)
-    variance: FloatArray  # (W, T, G)
+    limits: FloatArray  # (2, W, T, G), of mean and variance
     receiver: FloatArray  # (W, T, N + 1), by satellites in the mean over a receiver
 
 
@@ -172,7 +174,7 @@ def _tables(params: SigmaMonitorParams, n_receivers: int) -> _Tables:
     longest = int(np.ceil(4.0 * max(params.window_s) / params.sample_s))
     counts = np.unique(np.geomspace(1, longest, 24).astype(np.int64))
     shape = (len(params.window_s), len(params.correlation_s))
-    mean, variance = np.zeros((*shape, counts.size)), np.zeros((*shape, counts.size))
+    limits = np.zeros((2, *shape, counts.size))
     receiver = np.full((*shape, N_SATS + 1), np.inf)
     for place in np.ndindex(shape):
         window, correlation = params.window_s[place[0]], params.correlation_s[place[1]]
@@ -180,12 +182,14 @@ def _tables(params: SigmaMonitorParams, n_receivers: int) -> _Tables:
             # beyond four windows nothing changes any more
             used = min(int(count), int(np.ceil(4.0 * window / params.sample_s)))
             spread, eigenvalues = estimate_distribution(used, window, correlation, params.sample_s)
-            mean[*place, number] = -ndtri(0.5 * share) * np.sqrt(spread)
-            variance[*place, number] = quadratic_quantile(eigenvalues, share)
+            limits[0, *place, number] = -ndtri(0.5 * share) * np.sqrt(spread)
+            limits[1, *place, number] = quadratic_quantile(eigenvalues, share)
         _, eigenvalues = estimate_distribution(_full(window, params), window, correlation, params.sample_s)
         for satellites in range(1, N_SATS + 1):
             receiver[*place, satellites] = quadratic_quantile(eigenvalues / satellites, share, satellites)
-    return _Tables(counts.astype(np.float64), mean, variance, receiver)
+    steady = -np.expm1(-params.sample_s / np.array(params.window_s))
+    full = np.array([float(_full(window, params)) for window in params.window_s])
+    return _Tables(steady, full, counts.astype(np.float64), limits, receiver)
 
 
 def _full(window_s: float, params: SigmaMonitorParams) -> int:
@@ -199,49 +203,56 @@ class SigmaMonitorState:
 
     Attributes
     ----------
-    mean, square : (W, T, R, N) arrays
+    estimates : (2, W, T, R, N) array
         Weighted means of the normalised B values and of their squares.
-    count : (R, N) array
-        Samples taken.
-    since_s : (R, N) array
-        Time since the last one [s].
+    samples : (2, R, N) array
+        Samples taken; time since the last one [s].
     """
 
-    mean: FloatArray
-    square: FloatArray
-    count: FloatArray
-    since_s: FloatArray
+    estimates: FloatArray
+    samples: FloatArray
+
+    @property
+    def count(self) -> FloatArray:
+        """Samples taken, ``(R, N)``."""
+        return np.asarray(self.samples[0])
+
+    @property
+    def since_s(self) -> FloatArray:
+        """Time since the last one, ``(R, N)`` [s]."""
+        return np.asarray(self.samples[1])
 
 
 def initial_sigma_monitor(n_receivers: int, params: SigmaMonitorParams) -> SigmaMonitorState:
     """A monitor that has seen nothing; makes the tables of thresholds, which takes half a second once."""
     _tables(params, n_receivers)
-    shape = (len(params.window_s), len(params.correlation_s), n_receivers, N_SATS)
-    return SigmaMonitorState(
-        mean=np.zeros(shape),
-        square=np.zeros(shape),
-        count=np.zeros(shape[2:]),
-        since_s=np.zeros(shape[2:]),
-    )
+    shape = (2, len(params.window_s), len(params.correlation_s), n_receivers, N_SATS)
+    return SigmaMonitorState(estimates=np.zeros(shape), samples=np.zeros((2, *shape[3:])))
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class SigmaMonitorResult:
+class SigmaMonitorResult(NamedTuple):
     """What was found; statistics are those of the last sample of each channel.
 
     Attributes
     ----------
-    mean : MonitorResult
-        ``(W, T, R, N)``: size of the mean of the normalised B values.
-    variance : MonitorResult
-        ``(W, T, R, N)``: their mean square.
+    channels : MonitorResult
+        ``(2, W, T, R, N)``: size of the mean of the normalised B values, and their mean square.
     receivers : MonitorResult
         ``(W, T, R)``: mean square over the satellites that have filled the window. NaN, and not failed, without one.
     """
 
-    mean: MonitorResult
-    variance: MonitorResult
+    channels: MonitorResult
     receivers: MonitorResult
+
+    @property
+    def mean(self) -> MonitorResult:
+        """Size of the mean, ``(W, T, R, N)``."""
+        return MonitorResult(*(each[0] for each in self.channels))
+
+    @property
+    def variance(self) -> MonitorResult:
+        """Mean square, ``(W, T, R, N)``."""
+        return MonitorResult(*(each[1] for each in self.channels))
 
 
 def normalised_b(b_m: FloatArray, sigma_m: FloatArray, used: BoolArray) -> FloatArray:
@@ -260,9 +271,9 @@ def normalised_b(b_m: FloatArray, sigma_m: FloatArray, used: BoolArray) -> Float
     -----
     Sigma of a B value is that sigma over sqrt(M (M - 1)).
     """
-    count = used.sum(axis=0)
-    sigma = sigma_m / np.sqrt(np.where(count >= 2, count * (count - 1), np.nan))
-    return np.where(used, b_m / sigma[:, np.newaxis], np.nan)
+    normalised = np.empty(b_m.shape)
+    kernels.normalise(b_m, sigma_m, used, normalised)
+    return normalised
 
 
 def sigma_monitor_step(
@@ -291,35 +302,28 @@ def sigma_monitor_step(
     The weight of a sample depends on their number alone, not on the time between them: after a gap the samples are less
     correlated than the thresholds take them to be, which is the safe side.
     """
-    since = state.since_s + (dt_s if dt_s > 0.0 else 0.0)
-    count = np.where(since > params.forget_s, 0.0, state.count)
-    taken = np.isfinite(normalised).all(axis=0) & ((count == 0.0) | (since >= params.sample_s))
-    mean, square = state.mean, state.square
-    if taken.any():
-        count = count + taken
-        steady = -np.expm1(-params.sample_s / np.array(params.window_s))[:, np.newaxis, np.newaxis, np.newaxis]
-        weight = np.where(taken, np.maximum(1.0 / np.maximum(count, 1.0), steady), 0.0)
-        value = np.where(taken, normalised, 0.0)
-        mean = mean + weight * (value - mean)
-        square = square + weight * (value**2 - square)
-    new = SigmaMonitorState(mean=mean, square=square, count=count, since_s=np.where(taken, 0.0, since))
-    return new, _tested(new, due, params)
-
-
-def _tested(state: SigmaMonitorState, due: BoolArray, params: SigmaMonitorParams) -> SigmaMonitorResult:
     tables = _tables(params, len(due))
-    place = np.searchsorted(tables.counts, np.maximum(state.count, 1.0), side="right") - 1
-    known = state.count > 0.0
-    full = np.array([_full(window, params) for window in params.window_s])[:, np.newaxis, np.newaxis, np.newaxis]
-    filled = (state.count >= full) & due
-    number = filled.sum(axis=-1)  # (W, 1, R)
-    pooled = np.where(filled, state.square, 0.0).sum(axis=-1) / np.where(number > 0, number, np.nan)
-    windows = np.arange(len(params.window_s))[:, np.newaxis, np.newaxis]
-    constants = np.arange(len(params.correlation_s))[np.newaxis, :, np.newaxis]
-    return SigmaMonitorResult(
-        mean=upper_limit(np.where(known, np.abs(state.mean), np.nan), tables.mean[..., place], due),
-        variance=upper_limit(np.where(known, state.square, np.nan), tables.variance[..., place], due),
-        receivers=upper_limit(
-            pooled, tables.receiver[windows, constants, number], np.broadcast_to(number > 0, pooled.shape)
-        ),
+    shape = state.estimates.shape
+    estimates, samples = np.empty(shape), np.empty(state.samples.shape)
+    found, failed = np.empty((2, *shape)), np.empty(shape, dtype=bool)
+    pooled, pooled_failed = np.empty((2, *shape[1:4])), np.empty(shape[1:4], dtype=bool)
+    kernels.step(
+        state.estimates,
+        state.samples,
+        normalised,
+        due,
+        float(dt_s),
+        float(params.sample_s),
+        float(params.forget_s),
+        *tables,
+        estimates,
+        samples,
+        found,
+        failed,
+        pooled,
+        pooled_failed,
+    )
+    return SigmaMonitorState(estimates=estimates, samples=samples), SigmaMonitorResult(
+        channels=MonitorResult(statistic=found[0], threshold=found[1], failed=failed),
+        receivers=MonitorResult(statistic=pooled[0], threshold=pooled[1], failed=pooled_failed),
     )

@@ -28,7 +28,11 @@ from gbas_ground.monitors.double_difference import (
     reference_satellites,
 )
 from gbas_ground.monitors.gradient_coverage import gradient_site
-from gbas_ground.monitors.ionosphere_gradient import IonosphereGradientParams, check_ionosphere_gradient
+from gbas_ground.monitors.ionosphere_gradient import (
+    IonosphereGradientParams,
+    by_baseline,
+    check_ionosphere_gradient,
+)
 from gbas_msgs_py.joining import ReceptionQueue
 from gbas_studies.ccd.recorded import MASK_RAD, PAIR_L1L2, PAIR_L1L5, RecordedSet, station_params
 from gbas_studies.reproduction.drawing import new_figure
@@ -106,9 +110,10 @@ def pair_series(chosen: RecordedSet, data: Path, n_epochs: int | None = None) ->
             params.bands,
         )
         found = check_ionosphere_gradient(made, due, site, params)
+        tested = by_baseline(found, made, site, params)
         rows.append(
             (
-                made.residual_m[0], made.sigma_m[0], found.by_baseline.statistic[0], found.by_baseline.threshold[0],
+                made.residual_m[0], made.sigma_m[0], tested.statistic[0], tested.threshold[0],
                 predicted.elevation_rad, found.verdict.failed,
             )
         )  # fmt: skip

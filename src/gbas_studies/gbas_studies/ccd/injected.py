@@ -8,19 +8,19 @@ fault has made at a user whose filter is settled, or started at the worst time, 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from gbas_core.io.recording import RecordedEpoch
 from gbas_core.ranging.combinations import combination_matrix
-from gbas_core.ranging.divergence import GROUND, DivergenceState, ramp_response
+from gbas_core.ranging.divergence import GROUND, ramp_response
 from gbas_core.ranging.fault_modes import fault_direction
 from gbas_core.record import FloatArray
 from gbas_core.satellites import N_SATS, SAT_IDS
 from gbas_core.signals import L1, L5
-from gbas_ground.monitors.ccd import CcdParams, ccd_step, initial_ccd
+from gbas_ground.monitors.ccd import CcdParams, CcdState, ccd_step, initial_ccd
 from gbas_ground.monitors.ccd_f import (
     TwoFrequencyInput,
     TwoFrequencyParams,
@@ -83,7 +83,7 @@ class Base:
 
     Attributes
     ----------
-    single : DivergenceState
+    single : CcdState
     double : TwoFrequencyState
         After the last epoch before the fault.
     following : tuple of TwoFrequencyInput
@@ -91,7 +91,7 @@ class Base:
     params : TwoFrequencyParams
     """
 
-    single: DivergenceState
+    single: CcdState
     double: TwoFrequencyState
     following: tuple[TwoFrequencyInput, ...]
     params: TwoFrequencyParams
@@ -110,7 +110,7 @@ def settled_base(world: World, n_following: int, *, covariance: StatisticCovaria
     """Run a world until the monitors have settled, and keep what follows."""
     observer = Observer(world.ephemerides, np.array(ANTENNAS_M), GROUND.max_gap_s)
     single_params, params = CcdParams(), double_params(covariance)
-    single, double = initial_ccd(single_params, len(ANTENNAS_M)), initial_two_frequency(params, len(ANTENNAS_M))
+    single, double = initial_ccd(len(ANTENNAS_M)), initial_two_frequency(len(ANTENNAS_M))
     following = []
     nobody = np.zeros(N_SATS, dtype=bool)
     for number in range(SETTLE_EPOCHS + n_following):
@@ -195,8 +195,7 @@ def _with_fault(
     receivers = nominal.code_m.shape[0]
     effect = SignalEffect.none(receivers)
     fault.add_to(effect, Moment(since_s=np.full(receivers, since_s), interval_s=T_S, listeners=()))
-    return replace(
-        nominal,
+    return nominal._replace(
         code_m=nominal.code_m + effect.code_m,
         carrier_m=nominal.carrier_m + effect.carrier_m,
         clock_used=nominal.clock_used & ~failed,

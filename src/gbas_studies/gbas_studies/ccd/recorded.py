@@ -295,7 +295,7 @@ class _Run:
         self._observer = observer
         raw = replace(single.filters, tau_s=1e-6, settle_s=0.0)
         self._params = ((single, double), (replace(single, filters=raw), replace(double, filters=raw)))
-        self._states = [(initial_ccd(a, n_receivers), initial_two_frequency(b, n_receivers)) for a, b in self._params]
+        self._states = [(initial_ccd(n_receivers), initial_two_frequency(n_receivers)) for a, b in self._params]
         self._failed = np.zeros(N_SATS, dtype=bool)
 
     def over(self, epochs: Iterable[RecordedEpoch]) -> MonitoredSeries:

@@ -44,29 +44,26 @@ def fitted(s, m):
 
 
 @compiled
-def limit(variance: float, common: float, natural: float, k: float) -> float:
+def limit(variance, common, natural, k):
     """Threshold of a statistic: k sigma, with what the receivers share, over what is natural."""
     return k * np.sqrt(variance + common * common) + natural
 
 
 @compiled
-def advanced(history_m, age_s, unseen_s, residual_m, restarted, shift_m, dt_s, window_s, max_gap_s):
+def _advance(before, residual_m, restarted, shift_m, dt_s, window_s, max_gap_s, after):
     """The newest epoch in front of the others; what does not belong to it is forgotten.
 
-    Returns
-    -------
-    history_m : (W, R, F, N) array
-    age_s : (W,) array
-    unseen_s : (R, F, N) array
+    ``before`` and ``after``: carriers (W, R, F, N), ages (W,), times since each was last there (R, F, N).
     """
+    history_m, age_s, unseen_s = before
+    history, age, unseen = after
     n_epochs, n_receivers, n_bands, n_sats = history_m.shape
     goes_on = 0.0 < dt_s <= max_gap_s
-    age, kept = np.full(n_epochs, np.nan), 1
-    age[0] = 0.0
+    age[:] = np.nan
+    age[0], kept = 0.0, 1
     while goes_on and kept < n_epochs and age_s[kept - 1] + dt_s <= window_s:
         age[kept] = age_s[kept - 1] + dt_s
         kept += 1
-    history, unseen = np.full(history_m.shape, np.nan), np.empty(unseen_s.shape)
     lost = np.empty(n_sats, dtype=np.bool_)
     for row in range(n_receivers):
         for band in range(n_bands):
@@ -77,9 +74,9 @@ def advanced(history_m, age_s, unseen_s, residual_m, restarted, shift_m, dt_s, w
                 history[0, row, band, sat] = residual_m[row, band, sat]
             for epoch in range(1, kept):
                 for sat in range(n_sats):
-                    before = history_m[epoch - 1, row, band, sat] + shift_m[row, sat]
-                    history[epoch, row, band, sat] = np.nan if lost[sat] else before
-    return history, age, unseen
+                    earlier = history_m[epoch - 1, row, band, sat] + shift_m[row, sat]
+                    history[epoch, row, band, sat] = np.nan if lost[sat] else earlier
+    history[kept:] = np.nan
 
 
 @compiled
@@ -221,7 +218,7 @@ def _ratios(statistic, threshold, in_set, ratio):
 
 
 @compiled
-def judged(history_m, age_s, sigmas_m, factor, terms, k, least_points, min_satellites):
+def _judge(history_m, age_s, sigmas_m, factor, terms, k, least_points, min_satellites, known):
     """Statistics, variances and thresholds with the receivers' clocks taken from satellites that do not fail.
 
     When one fails, all whose step, rate or acceleration is beyond the threshold from the receiver's median leave its
@@ -229,13 +226,9 @@ def judged(history_m, age_s, sigmas_m, factor, terms, k, least_points, min_satel
     mean. Then the worst satellite of each receiver and band leaves, and all is computed again, until nobody in a set
     fails: a bad satellite must not be seen on the others through the clock.
 
-    Returns
-    -------
-    (3, R, F, S, N) array
-        Statistic, variance, threshold.
+    ``known`` (3, R, F, S, N): statistic, variance, threshold.
     """
     n_epochs, n_receivers, n_bands, n_sats = history_m.shape
-    known = np.empty((3, n_receivers, n_bands, _S, n_sats))
     in_set = np.zeros((n_receivers, n_bands, n_sats), dtype=np.bool_)
     change, there, free = np.zeros((n_epochs, n_sats)), np.zeros((n_epochs, n_sats)), np.empty((n_epochs, n_sats))
     s, m, share, ratio = np.empty((5, n_sats)), np.empty((3, n_sats)), np.empty(n_sats), np.empty(n_sats)
@@ -259,7 +252,7 @@ def judged(history_m, age_s, sigmas_m, factor, terms, k, least_points, min_satel
                 )
                 fails |= _ratios(statistic, threshold, in_set[row, band], ratio)
         if not fails:
-            return known
+            return
         turn += 1
         left = False
         for row in range(n_receivers if turn == 1 else 0):
@@ -275,89 +268,93 @@ def judged(history_m, age_s, sigmas_m, factor, terms, k, least_points, min_satel
 
 
 @compiled
-def _averaged(known, taken, band, sat, each):
-    """Mean of a statistic over the receivers taken, and its variance; NaN without one."""
-    total, spread, count = 0.0, 0.0, 0
-    for row in range(known.shape[1]):
-        if taken[row]:
-            total += known[0, row, band, each, sat]
-            spread += known[1, row, band, each, sat]
-            count += 1
-    if count == 0:
-        return np.nan, 0.0
-    return total / count, spread / (count * count)
+def _count(known, due, band, beyond, there, wanted, number):
+    """Channels of a band that are beyond a threshold, that judge, and that are wanted ``(R, N)``; how many ``(3, N)``.
+
+    Channels that are not due judge no satellite that others are due for; alone, they show how it would do.
+    """
+    n_receivers, n_sats = due.shape
+    number[:] = 0
+    for row in range(n_receivers):
+        statistic, threshold = known[0, row, band], known[2, row, band]
+        for sat in range(n_sats):
+            has = np.isfinite(statistic[0, sat])
+            wanted[row, sat], there[row, sat], beyond[row, sat] = due[row, sat] and (band == 0 or has), has, False
+            for each in range(_S):
+                beyond[row, sat] |= has and np.abs(statistic[each, sat]) > threshold[each, sat]
+            number[2, sat] += 1 if wanted[row, sat] else 0
+    for row in range(n_receivers):
+        for sat in range(n_sats):
+            there[row, sat] &= wanted[row, sat] or number[2, sat] == 0
+            beyond[row, sat] &= there[row, sat]
+            number[0, sat] += 1 if beyond[row, sat] else 0
+            number[1, sat] += 1 if there[row, sat] else 0
 
 
 @compiled
-def _blamed(known, due, band, sat, beyond, there, wanted):
-    """Which receivers' channels are beyond a threshold, have statistics, and are wanted; how many of each."""
-    number, judging, expected = 0, 0, 0
-    for row in range(known.shape[1]):
-        has = np.isfinite(known[0, row, band, 0, sat])
-        wanted[row] = due[row, sat] and (band == 0 or has)
-        there[row], beyond[row] = has, False
-        for each in range(_S):
-            beyond[row] |= has and np.abs(known[0, row, band, each, sat]) > known[2, row, band, each, sat]
-        expected += 1 if wanted[row] else 0
-    for row in range(known.shape[1]):
-        # channels that are not due judge no satellite that others are due for; alone, they show how it would do
-        there[row] = there[row] and (wanted[row] or expected == 0)
-        beyond[row] = beyond[row] and there[row]
-        number += 1 if beyond[row] else 0
-        judging += 1 if there[row] else 0
-    return number, judging, expected
-
-
-@compiled
-def concluded(known, due, terms, k):
+def _conclude(known, due, terms, k, satellites, failed, failed_channels, failed_satellites):
     """Who is to blame: one channel of three or more that fails alone, or the satellite.
+
+    ``satellites`` (2, S, F, N): sizes of the means over the receivers and thresholds; ``failed`` (S, F, N),
+    ``failed_channels`` (R, N), ``failed_satellites`` (N,).
+    """
+    _, n_receivers, n_bands, _, n_sats = known.shape
+    masks, number = np.empty((3, n_receivers, n_sats), dtype=np.bool_), np.empty((3, n_sats), dtype=np.int64)
+    beyond, there, wanted = masks[0], masks[1], masks[2]
+    failed_channels[:] = False
+    failed_satellites[:] = False
+    for band in range(n_bands):
+        _count(known, due, band, beyond, there, wanted, number)
+        for row in range(n_receivers):
+            for sat in range(n_sats):
+                lonely = beyond[row, sat] and number[0, sat] == 1 and number[1, sat] >= 3
+                failed_channels[row, sat] |= wanted[row, sat] and (lonely or not there[row, sat])
+                there[row, sat] &= not lonely
+        for each in range(_S):
+            for sat in range(n_sats):
+                total, spread, count = 0.0, 0.0, 0
+                for row in range(n_receivers):
+                    if there[row, sat]:
+                        total += known[0, row, band, each, sat]
+                        spread += known[1, row, band, each, sat]
+                        count += 1
+                size = np.abs(total / count) if count > 0 else np.nan
+                threshold = limit(spread / max(count * count, 1), terms[0, each], terms[1, each], k)
+                alone = number[0, sat] == 1 and number[1, sat] >= 3
+                fails = number[2, sat] > 0 and (not size <= threshold or (number[0, sat] > 0 and not alone))
+                satellites[0, each, band, sat], satellites[1, each, band, sat] = size, threshold
+                failed[each, band, sat] = fails
+                failed_satellites[sat] |= fails
+
+
+@compiled
+def step(
+    before, residual_m, restarted, due, sigmas_m, factor, shift_m, terms, dt_s, window_s, max_gap_s, k, least_points,
+    min_satellites, after, known, satellites, failed, failed_channels, failed_satellites,
+):  # fmt: skip
+    """One epoch.
 
     Parameters
     ----------
-    known : (3, R, F, S, N) array
-        From :func:`judged`.
+    before, after : tuple of arrays
+        Carriers (W, R, F, N), ages (W,), times since each was last there (R, F, N); `after` is filled in.
+    residual_m, restarted : (R, F, N) arrays
     due : (R, N) bool array
+    sigmas_m : (F, N) array
+        Of a receiver of factor 1 [m].
+    factor : (R,) array
+    shift_m : (R, N) array
     terms : (2, S) array
         What the receivers share, and what is natural.
-    k : float
-
-    Returns
-    -------
-    channels : (2, S, R, F, N) array
-        Sizes and thresholds.
-    channels_failed : (S, R, F, N) bool array
+    dt_s, window_s, max_gap_s, k : float
+    least_points, min_satellites : int
+    known : (3, R, F, S, N) array
+        Filled in: statistics of the channels, their variances and thresholds.
     satellites : (2, S, F, N) array
-        Sizes of the means over the receivers, and thresholds.
-    satellites_failed : (S, F, N) bool array
-    failed_channels : (R, N) bool array
-    failed_satellites : (N,) bool array
+        Filled in: sizes of the means over the receivers, and thresholds.
+    failed, failed_channels, failed_satellites : (S, F, N), (R, N), (N,) bool arrays
+        Filled in.
     """
-    _, n_receivers, n_bands, _, n_sats = known.shape
-    channels = np.empty((2, _S, n_receivers, n_bands, n_sats))
-    channels_failed = np.empty((_S, n_receivers, n_bands, n_sats), dtype=np.bool_)
-    satellites = np.empty((2, _S, n_bands, n_sats))
-    satellites_failed = np.empty((_S, n_bands, n_sats), dtype=np.bool_)
-    failed_channels = np.zeros((n_receivers, n_sats), dtype=np.bool_)
-    failed_satellites = np.zeros(n_sats, dtype=np.bool_)
-    masks = np.empty((3, n_receivers), dtype=np.bool_)
-    beyond, there, wanted = masks[0], masks[1], masks[2]
-    for band in range(n_bands):
-        for sat in range(n_sats):
-            number, judging, expected = _blamed(known, due, band, sat, beyond, there, wanted)
-            alone = number == 1 and judging >= 3
-            for row in range(n_receivers):
-                for each in range(_S):
-                    size, threshold = np.abs(known[0, row, band, each, sat]), known[2, row, band, each, sat]
-                    channels[0, each, row, band, sat], channels[1, each, row, band, sat] = size, threshold
-                    channels_failed[each, row, band, sat] = wanted[row] and not size <= threshold
-                lonely = beyond[row] and alone
-                failed_channels[row, sat] |= wanted[row] and (lonely or not there[row])
-                there[row] = there[row] and not lonely
-            for each in range(_S):
-                mean, spread = _averaged(known, there, band, sat, each)
-                threshold = limit(spread, terms[0, each], terms[1, each], k)
-                failed = expected > 0 and (not np.abs(mean) <= threshold or (number >= 1 and not alone))
-                satellites[0, each, band, sat], satellites[1, each, band, sat] = np.abs(mean), threshold
-                satellites_failed[each, band, sat] = failed
-                failed_satellites[sat] |= failed
-    return channels, channels_failed, satellites, satellites_failed, failed_channels, failed_satellites
+    _advance(before, residual_m, restarted, shift_m, dt_s, window_s, max_gap_s, after)
+    _judge(after[0], after[1], sigmas_m, factor, terms, k, least_points, min_satellites, known)
+    _conclude(known, due, terms, k, satellites, failed, failed_channels, failed_satellites)

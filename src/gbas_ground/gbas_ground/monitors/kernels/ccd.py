@@ -6,57 +6,54 @@ from __future__ import annotations
 import numpy as np
 
 from gbas_core.compiled import compiled
-from gbas_ground.monitors.kernels.divergence_filter import filter_value
+from gbas_ground.monitors.kernels.divergence_filter import AGE, F1, F2, N_MEMORY, SINCE, VALUE, filter_value
 
 
 @compiled
-def filtered_rates(value_m, f1, f2, since_s, age_s, code_m, carrier_m, restarted, dt_s, tau_s, max_gap_s, settle_s):
-    """Filter code minus carrier of every channel, arrays ``(R, F, N)``.
-
-    Returns
-    -------
-    value_m, f1, f2, since_s, age_s : arrays
-        Memory of the filters.
-    filtered : array
-        [m/s].
-    settled : bool array
-    """
-    shape = code_m.shape
-    value, first, second = np.empty(shape), np.empty(shape), np.empty(shape)
-    since, age, filtered = np.empty(shape), np.empty(shape), np.empty(shape)
-    settled = np.empty(shape, dtype=np.bool_)
-    for row in range(shape[0]):
-        for band in range(shape[1]):
-            for sat in range(shape[2]):
-                at = row, band, sat
-                now = code_m[at] - carrier_m[at]
-                value[at], first[at], second[at], since[at], age[at], _, filtered[at] = filter_value(
-                    value_m[at], f1[at], f2[at], since_s[at], age_s[at], now, restarted[at], dt_s, tau_s, max_gap_s
-                )
-                settled[at] = age[at] >= settle_s and since[at] == 0.0
-    return value, first, second, since, age, filtered, settled
+def _filter(memory, code_m, carrier_m, restarted, dt_s, tau_s, max_gap_s, settle_s, after, filtered, settled):
+    for row in range(code_m.shape[0]):
+        for band in range(code_m.shape[1]):
+            for sat in range(code_m.shape[2]):
+                at, own = (row, band, sat), memory[:, row, band, sat]
+                made = filter_value(
+                    own[VALUE], own[F1], own[F2], own[SINCE], own[AGE],
+                    code_m[at] - carrier_m[at], restarted[at], dt_s, tau_s, max_gap_s,
+                )  # fmt: skip
+                for each in range(N_MEMORY):
+                    after[each, row, band, sat] = made[each]
+                filtered[at] = made[N_MEMORY + 1]
+                settled[at] = made[AGE] >= settle_s and made[SINCE] == 0.0
 
 
 @compiled
-def tested(filtered, settled, used, threshold):
-    """Mean of the settled channels in use ``(F, N)``, how many they are, its size, and whether that is too large.
+def step(
+    memory, code_m, carrier_m, restarted, used, dt_s, tau_s, max_gap_s, settle_s, threshold_mps,
+    after, filtered, settled, means, failed,
+):  # fmt: skip
+    """Filter code minus carrier of every channel, and test the means over the receivers.
 
-    ``filtered`` (R, F, N), ``used`` (R, N). Where there is no channel the mean is NaN and nothing fails.
+    Parameters
+    ----------
+    memory, after : (5, R, F, N) arrays
+        Of the filters; `after` is filled in.
+    code_m, carrier_m, restarted : (R, F, N) arrays
+    used : (R, N) bool array
+    dt_s, tau_s, max_gap_s, settle_s, threshold_mps : float
+    filtered, settled : (R, F, N) arrays
+        Filled in: rates [m/s], and where they count.
+    means : (3, F, N) array
+        Filled in: mean of the settled channels in use, its size, NaN without one, and how many they are.
+    failed : (F, N) bool array
+        Filled in.
     """
-    n_receivers, n_bands, n_sats = filtered.shape
-    mean, size = np.full((n_bands, n_sats), np.nan), np.full((n_bands, n_sats), np.nan)
-    receivers = np.zeros((n_bands, n_sats), dtype=np.int64)
-    failed = np.zeros((n_bands, n_sats), dtype=np.bool_)
-    for band in range(n_bands):
-        for sat in range(n_sats):
+    _filter(memory, code_m, carrier_m, restarted, dt_s, tau_s, max_gap_s, settle_s, after, filtered, settled)
+    for band in range(code_m.shape[1]):
+        for sat in range(code_m.shape[2]):
             total, count = 0.0, 0
-            for row in range(n_receivers):
+            for row in range(code_m.shape[0]):
                 if settled[row, band, sat] and used[row, sat]:
                     total += filtered[row, band, sat]
                     count += 1
-            if count > 0:
-                mean[band, sat] = total / count
-                size[band, sat] = np.abs(mean[band, sat])
-                failed[band, sat] = not size[band, sat] <= threshold
-            receivers[band, sat] = count
-    return mean, receivers, size, failed
+            mean = total / count if count > 0 else np.nan
+            means[0, band, sat], means[1, band, sat], means[2, band, sat] = mean, np.abs(mean), count
+            failed[band, sat] = count > 0 and not np.abs(mean) <= threshold_mps

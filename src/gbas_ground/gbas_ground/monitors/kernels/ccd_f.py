@@ -34,15 +34,13 @@ def ionosphere_free(value_m, other_m, near, far):
 
 
 @compiled
-def _compensated_m(carrier_m, range_m, clock_s, elevation_rad, zenith_delay_m, bands, near, far):
+def _compensate(carrier_m, range_m, clock_s, elevation_rad, zenith_delay_m, bands, near, far, residual):
     """IF carriers less geometry, satellite clock and troposphere, ``(R, N)`` [m]."""
-    residual = np.empty(range_m.shape)
     for sat in range(len(elevation_rad)):
         troposphere = zenith_delay_m * obliquity(np.sin(elevation_rad[sat]))
         for row in range(len(range_m)):
             free = ionosphere_free(carrier_m[row, bands[0], sat], carrier_m[row, bands[1], sat], near, far)
             residual[row, sat] = free - range_m[row, sat] + SPEED_OF_LIGHT_MPS * clock_s[row, sat] - troposphere
-    return residual
 
 
 @compiled
@@ -91,17 +89,17 @@ def _filter_carrier(memory, new, rate_mps, change_m, clock_m, away_s, coasting, 
 
 @compiled
 def advanced(
-    filters, residual_m, clock_m, since_s, was_rebased, code_m, carrier_m, restarted, range_m, clock_s, rebased,
-    elevation_rad, clock_used, bands, weights, dt_s, tau_s, max_gap_s, settle_s, zenith_delay_m,
+    filters, carriers, was_rebased, code_m, carrier_m, restarted, range_m, clock_s, rebased, elevation_rad, clock_used,
+    bands, weights, dt_s, tau_s, max_gap_s, settle_s, zenith_delay_m, new, after, rates, settled,
 ):  # fmt: skip
     """Filter the rates of both DF and of the IF carrier, that less the mean of all.
 
     Parameters
     ----------
-    filters : (3, 5, R, N) array
-        Memory of DF, DF of the other band and IF carrier.
-    residual_m, clock_m, since_s : (R, N) arrays
-        Last IF carrier without geometry, mean of all accumulated since, and time since.
+    filters, new : (3, 5, R, N) arrays
+        Memory of DF, DF of the other band and IF carrier; `new` is filled in.
+    carriers, after : (3, R, N) arrays
+        Last IF carrier without geometry, mean of all accumulated since, and time since; `after` is filled in.
     was_rebased : (N,) bool array
     code_m, carrier_m, restarted : (R, N_BANDS, N) arrays
     range_m, clock_s : (R, N) arrays
@@ -113,20 +111,15 @@ def advanced(
         Gains of both DF, and coefficients of the IF combination.
     dt_s, tau_s, max_gap_s, settle_s, zenith_delay_m : float
 
-    Returns
-    -------
-    filters, residual_m, clock_m, since_s : arrays
-        As given, one epoch later.
     rates : (3, R, N) array
-        Filtered [m/s].
+        Filled in: filtered [m/s].
     settled : (R, N) bool array
-        Where all three count.
+        Filled in: where all three count.
     """
     n_receivers, n_sats = range_m.shape
-    new, rates = np.full(filters.shape, np.nan), np.empty((3, n_receivers, n_sats))
-    clock, since = np.empty(range_m.shape), np.empty(range_m.shape)
-    settled = np.empty(range_m.shape, dtype=np.bool_)
-    residual = _compensated_m(carrier_m, range_m, clock_s, elevation_rad, zenith_delay_m, bands, weights[2], weights[3])
+    residual_m, clock_m, since_s = carriers[0], carriers[1], carriers[2]
+    residual, clock, since = after[0], after[1], after[2]
+    _compensate(carrier_m, range_m, clock_s, elevation_rad, zenith_delay_m, bands, weights[2], weights[3], residual)
     lost, coasting, present = np.empty(n_sats, np.bool_), np.empty(n_sats, np.bool_), np.empty(n_sats, np.bool_)
     change = np.empty(n_sats)
     for row in range(n_receivers):
@@ -156,7 +149,6 @@ def advanced(
                 settled[row, sat] &= new[each, AGE, row, sat] >= settle_s and new[each, SINCE, row, sat] == 0.0
             if present[sat]:
                 clock[row, sat], since[row, sat] = 0.0, 0.0
-    return new, residual, clock, since, rates, settled
 
 
 @compiled
@@ -165,12 +157,15 @@ def covariance_at(elevation_rad, receivers, clock_satellites, own, common, nodes
 
     ``own``, ``common`` (3, 3); ``nodes`` (K,) and ``factor`` (K, 3) are the factors s by elevation, none: one.
     """
-    scale = np.ones(3) if np.isfinite(elevation_rad) else np.full(3, np.nan)
-    for each in range(3 if len(nodes) > 0 else 0):
-        scale[each] *= interpolated(elevation_rad, nodes, factor[:, each])
     for i in range(3):
         for j in range(3):
-            covariance[i, j] = (own[i, j] / np.maximum(receivers, 1.0) + common[i, j]) * scale[i] * scale[j]
+            covariance[i, j] = own[i, j] / np.maximum(receivers, 1.0) + common[i, j]
+    for each in range(3):
+        scale = 1.0 if np.isfinite(elevation_rad) else np.nan
+        if len(nodes) > 0:
+            scale *= interpolated(elevation_rad, nodes, factor[:, each])
+        covariance[each, :] *= scale
+        covariance[:, each] *= scale
     covariance[2, 2] *= 1.0 + 1.0 / np.maximum(clock_satellites, 1.0)
 
 
@@ -244,13 +239,12 @@ def _others_mean(rate, member, groups, fewest, clock, others):
 
 
 @compiled
-def clocks(rate, settled, clock_used, suspect, groups, everyone, fewest):
+def _clocks(rate, settled, clock_used, suspect, groups, everyone, fewest, clock, others):
     """Receiver clocks of each satellite and how many others they are of, ``(R, N)``, without those suspected.
 
     Where that leaves too few of a constellation, the clock is that of `everyone`.
     """
     n_receivers, n_sats = rate.shape
-    clock, others = np.empty(rate.shape), np.empty(rate.shape)
     member, of_all, all_others = np.empty(n_sats, np.bool_), np.empty(n_sats), np.empty(n_sats)
     any_suspect = suspect.any()
     for row in range(n_receivers):
@@ -262,20 +256,24 @@ def clocks(rate, settled, clock_used, suspect, groups, everyone, fewest):
             for sat in range(n_sats):
                 if others[row, sat] < fewest:
                     clock[row, sat], others[row, sat] = of_all[sat], all_others[sat]
-    return clock, others
 
 
 @compiled
-def judged(rates, settled, clock, others, used, elevation_rad, own, common, nodes, factor, inverse, weights, limits):
-    """Means over the receivers, and both forms of the test.
+def judge(
+    rates, settled, used, clock_used, suspect, groups, everyone, fewest, elevation_rad, own, common, nodes, factor,
+    inverse, weights, limits, receiver, counts, found, covariance, failed,
+):  # fmt: skip
+    """Means over the receivers, with clocks that do without those suspected, and both forms of the test.
 
     Parameters
     ----------
     rates : (3, R, N) array
         From :func:`advanced`.
-    settled, used : (R, N) bool arrays
-    clock, others : (R, N) arrays
-        From :func:`clocks`.
+    settled, used, clock_used : (R, N) bool arrays
+    suspect : (N,) bool array
+    groups, everyone : (k, N) and (1, N) bool arrays
+    fewest : int
+        Others a clock is averaged from.
     elevation_rad : (N,) array
     own, common, nodes, factor : arrays
         As of :func:`covariance_at`.
@@ -283,49 +281,46 @@ def judged(rates, settled, clock, others, used, elevation_rad, own, common, node
         Of the published covariance; not a number where that form does not apply.
     weights : (4,) array
         As of :func:`advanced`.
-    limits : (2,) array
+    limits : (2, N) array
         Thresholds of the published form and of that of full rank.
-
-    Returns
-    -------
     receiver : (3, R, N) array
-        Rates, that of the carrier without the clock.
+        Filled in: rates, that of the carrier without the clock.
     counts : (R, N) bool array
-    mean : (4, N) array
-    receivers : (N,) int array
-    clock_satellites : (N,) array
+        Filled in: where all three are.
+    found : (8, N) array
+        Filled in: four means, receivers, fewest satellites behind their clocks, and the statistics of both forms.
     covariance : (N, 3, 3) array
-    statistic : (2, N) array
     failed : (2, N) bool array
     """
-    n_receivers, n_sats = clock.shape
-    receiver, counts = rates.copy(), np.empty(clock.shape, dtype=np.bool_)
-    mean, number = np.full((4, n_sats), np.nan), np.zeros(n_sats, dtype=np.int64)
-    clock_satellites, covariance = np.full(n_sats, np.nan), np.empty((n_sats, 3, 3))
-    statistic, failed = np.full((2, n_sats), np.nan), np.zeros((2, n_sats), dtype=np.bool_)
-    applies = np.isfinite(inverse[0, 0])
-    x = np.empty(3)
+    n_receivers, n_sats = settled.shape
+    clock, others, x = np.empty(settled.shape), np.empty(settled.shape), np.empty(3)
+    _clocks(rates[2], settled, clock_used, suspect, groups, everyone, fewest, clock, others)
+    for row in range(n_receivers):
+        for sat in range(n_sats):
+            receiver[0, row, sat], receiver[1, row, sat] = rates[0, row, sat], rates[1, row, sat]
+            receiver[2, row, sat] = rates[2, row, sat] - clock[row, sat]
+            counts[row, sat] = settled[row, sat] and np.isfinite(clock[row, sat])
+    found[:] = np.nan
+    failed[:] = False
     for sat in range(n_sats):
         x[:] = 0.0
-        fewest = np.inf
+        number, least = 0.0, np.inf
         for row in range(n_receivers):
-            receiver[2, row, sat] -= clock[row, sat]
-            counts[row, sat] = settled[row, sat] and np.isfinite(clock[row, sat])
             if counts[row, sat] and used[row, sat]:
-                number[sat] += 1
-                fewest = min(fewest, others[row, sat])
+                number += 1.0
+                least = min(least, others[row, sat])
                 for each in range(3):
                     x[each] += receiver[each, row, sat]
-        covariance_at(elevation_rad[sat], number[sat], fewest, own, common, nodes, factor, covariance[sat])
-        if number[sat] == 0:
+        found[4, sat] = number
+        covariance_at(elevation_rad[sat], number, least, own, common, nodes, factor, covariance[sat])
+        if number == 0.0:
             continue
-        x /= number[sat]
-        clock_satellites[sat] = fewest
-        mean[0, sat], mean[1, sat], mean[3, sat] = x[0], x[1], x[2]
-        mean[2, sat] = ionosphere_free(x[0], x[1], weights[2], weights[3])
-        statistic[1, sat] = chi_square(x, covariance[sat])
-        if applies:
-            statistic[0, sat] = published(mean[:, sat], 1.0 * number[sat], inverse)
-        failed[0, sat] = applies and not statistic[0, sat] <= limits[0]
-        failed[1, sat] = not statistic[1, sat] <= limits[1]
-    return receiver, counts, mean, number, clock_satellites, covariance, statistic, failed
+        for each in range(3):
+            x[each] /= number
+        found[0, sat], found[1, sat], found[3, sat], found[5, sat] = x[0], x[1], x[2], least
+        found[2, sat] = ionosphere_free(x[0], x[1], weights[2], weights[3])
+        found[7, sat] = chi_square(x, covariance[sat])
+        failed[1, sat] = not found[7, sat] <= limits[1, sat]
+        if np.isfinite(inverse[0, 0]):
+            found[6, sat] = published(found[:4, sat], number, inverse)
+            failed[0, sat] = not found[6, sat] <= limits[0, sat]

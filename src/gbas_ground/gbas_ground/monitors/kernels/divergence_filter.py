@@ -11,6 +11,8 @@ from typing import Final
 import numpy as np
 
 from gbas_core.compiled import compiled
+from gbas_core.record import FloatArray
+from gbas_core.satellites import N_SATS
 
 VALUE, F1, F2, SINCE, AGE = range(5)
 N_MEMORY: Final = 5
@@ -76,3 +78,10 @@ def filter_rate(f1, f2, since_s, age_s, rate, over_s, restarted, dt_s, tau_s, ma
     starting = usable and not alive
     kept = age_s if alive else (0.0 if starting else np.nan)
     return _advanced(f1, f2, kept, over_s if usable else since_s, rate, usable, starting, tau_s)
+
+
+def initial_memory(*leading: int) -> FloatArray:
+    """Memory of filters that have seen nothing, ``(5, *leading, N)``."""
+    memory = np.zeros((N_MEMORY, *leading, N_SATS))
+    memory[[VALUE, AGE]] = np.nan
+    return memory

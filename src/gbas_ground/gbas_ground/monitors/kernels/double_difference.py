@@ -33,12 +33,11 @@ def obliquity(sine):
 
 
 @compiled
-def slant_delays_m(elevation_rad, azimuth_rad, place_m, refractivity, scale_height_m):
-    """Delay of the troposphere at each receiver, ``(R, N)`` [m].
+def slant_delays_m(elevation_rad, azimuth_rad, place_m, refractivity, scale_height_m, delay):
+    """Delay of the troposphere at each receiver, into ``(R, N)`` [m].
 
     Source: ICAO Annex 10 Vol. I, App. B 3.6.5.3, the delay whose difference between two heights is TC.
     """
-    delay = np.empty((len(place_m), len(elevation_rad)))
     for sat in range(len(elevation_rad)):
         sine, cosine = np.sin(elevation_rad[sat]), np.cos(elevation_rad[sat])
         east, north = np.sin(azimuth_rad[sat]), np.cos(azimuth_rad[sat])
@@ -50,27 +49,23 @@ def slant_delays_m(elevation_rad, azimuth_rad, place_m, refractivity, scale_heig
         zenith = refractivity * 1e-6 * scale_height_m * np.exp(-place_m[row, 2] / scale_height_m)
         for sat in range(len(elevation_rad)):
             delay[row, sat] *= zenith
-    return delay
 
 
 @compiled
-def residuals_m(carrier_m, range_m, clock_s, delay_m, bands):
-    """Carriers without geometry, satellite clock and troposphere, ``(R, F, N)`` [m]."""
-    n_receivers, _, n_sats = carrier_m.shape
-    residual = np.empty((n_receivers, len(bands), n_sats))
-    for row in range(n_receivers):
-        for place in range(len(bands)):
-            for sat in range(n_sats):
+def residuals_m(carrier_m, range_m, clock_s, delay_m, bands, residual):
+    """Carriers without geometry, satellite clock and troposphere, into ``(R, F, N)`` [m]."""
+    for row in range(residual.shape[0]):
+        for place in range(residual.shape[1]):
+            for sat in range(residual.shape[2]):
                 expected = range_m[row, sat] - SPEED_OF_LIGHT_MPS * clock_s[row, sat] + delay_m[row, sat]
                 residual[row, place, sat] = carrier_m[row, bands[place], sat] - expected
-    return residual
 
 
 @compiled
-def highest(may_refer, elevation_rad, groups, count):
-    """The highest satellites of each satellite's constellation, ``(N, count)``; -1 where there are fewer."""
-    n_sats = len(elevation_rad)
-    found = np.full((n_sats, count), -1)
+def highest(may_refer, elevation_rad, groups, found):
+    """The highest satellites of each satellite's constellation, into ``(N, P)``; -1 where there are fewer."""
+    n_sats, count = found.shape
+    found[:] = -1
     for group in range(len(groups)):
         best = np.full(count, -1)
         for sat in range(n_sats):
@@ -86,7 +81,6 @@ def highest(may_refer, elevation_rad, groups, count):
         for sat in range(n_sats):
             if groups[group, sat]:
                 found[sat] = best
-    return found
 
 
 @compiled
@@ -100,7 +94,7 @@ def _insert(values, keys, count, value, key):
 
 
 @compiled
-def middle(residual_m, first, second, factor, sigma_m, references, wavelength_m):
+def middle(residual_m, first, second, factor, sigma_m, references, wavelength_m, found, chosen):
     """Of every baseline, band and satellite the middle one of the statistics against its reference satellites.
 
     Parameters
@@ -115,17 +109,15 @@ def middle(residual_m, first, second, factor, sigma_m, references, wavelength_m)
         Of a receiver of factor 1 [m].
     references : (N, P) int array
     wavelength_m : (F,) array
-
-    Returns
-    -------
-    residual_m, sigma_m, nominal_sigma_m : (B, F, N) arrays
-        [m].
-    reference : (B, F, N) int array
+    found : (3, B, F, N) array
+        Filled in: double differences, their sigmas and nominal sigmas [m].
+    chosen : (B, F, N) int array
+        Filled in: the reference satellite.
     """
     n_bands, n_sats = sigma_m.shape
-    shape = (len(first), n_bands, n_sats)
-    left, sigma, nominal = np.full(shape, np.nan), np.full(shape, np.nan), np.full(shape, np.nan)
-    chosen = np.full(shape, -1)
+    left, sigma, nominal = found[0], found[1], found[2]
+    found[:] = np.nan
+    chosen[:] = -1
     most = references.shape[1]
     keys, order = np.empty(most), np.empty(most, dtype=np.int64)
     sizes, values, others = np.empty(most), np.empty(most), np.empty(most, dtype=np.int64)
@@ -161,7 +153,6 @@ def middle(residual_m, first, second, factor, sigma_m, references, wavelength_m)
                 left[row, band, sat] = values[place]
                 sigma[row, band, sat] = np.sqrt(variance[sat] + variance[others[place]])
                 nominal[row, band, sat] = np.sqrt(sizes[count - 1 - rank])
-    return left, sigma, nominal, chosen
 
 
 @compiled
@@ -176,52 +167,49 @@ def any_beyond(residual_m, sigma_m, k, due):
 
 
 @compiled
-def deciding(statistic, threshold, all_of_band):
-    """Baseline and band, flattened, that decide about each satellite, ``(N,)``; of equals the first.
+def _worst_of_bands(ratio):
+    """Baseline and band of the worst of the bands' best of ``(B, F)``; NaN is none."""
+    worst, place, band = -1.0, 0, 0
+    for each in range(ratio.shape[1]):
+        best, least = 0, np.inf
+        for row in range(ratio.shape[0]):
+            if ratio[row, each] < least:
+                best, least = row, ratio[row, each]
+        if worst < least < np.inf:
+            worst, place, band = least, best, each
+    return place, band
+
+
+@compiled
+def _worst(ratio):
+    """Baseline and band of the worst of ``(B, F)``; NaN is none."""
+    worst, place, band = -1.0, 0, 0
+    for row in range(ratio.shape[0]):
+        for each in range(ratio.shape[1]):
+            if ratio[row, each] > worst:
+                worst, place, band = ratio[row, each], row, each
+    return place, band
+
+
+@compiled
+def deciding(ratio, all_of_band):
+    """Baseline and band that decide about a satellite, by statistics over thresholds ``(B, F)``; of equals the first.
 
     The worst of all; or, where all baselines of a band have to fail, the worst of the bands' best.
     """
-    n_baselines, n_bands, n_sats = statistic.shape
-    place = np.zeros(n_sats, dtype=np.int64)
-    for sat in range(n_sats):
-        largest = -1.0
-        if all_of_band:
-            for band in range(n_bands):
-                best, least = 0, np.inf
-                for row in range(n_baselines):
-                    ratio = statistic[row, band, sat] / threshold[row, band, sat]
-                    if ratio < least:
-                        best, least = row, ratio
-                if least < np.inf and least > largest:
-                    largest, place[sat] = least, best * n_bands + band
-            continue
-        for row in range(n_baselines):
-            for band in range(n_bands):
-                ratio = statistic[row, band, sat] / threshold[row, band, sat]
-                if ratio > largest:
-                    largest, place[sat] = ratio, row * n_bands + band
-    return place
+    return _worst_of_bands(ratio) if all_of_band else _worst(ratio)
 
 
 @compiled
-def picked(values, place):
-    """One baseline and band of each satellite, ``(N,)``; NaN without baselines."""
-    n_baselines, n_bands, n_sats = values.shape
-    found = np.full(n_sats, np.nan)
-    if n_baselines > 0:
-        for sat in range(n_sats):
-            found[sat] = values[place[sat] // n_bands, place[sat] % n_bands, sat]
-    return found
-
-
-@compiled
-def followed(before_m, unseen_s, residual_m, sigma_m, first, second, shift_m, due, dt_s, max_gap_s, k, wavelength_m):
+def follow(
+    before, residual_m, sigma_m, first, second, shift_m, due, dt_s, max_gap_s, k, wavelength_m, after, found, failed
+):
     """Double differences followed through the half wavelengths, and tested.
 
     Parameters
     ----------
-    before_m, unseen_s : (B, F, N) arrays
-        As they were followed, and time since each was last there.
+    before, after : (2, B, F, N) arrays
+        As they were followed [m], and time since each was last there [s]; `after` is filled in.
     residual_m, sigma_m : (B, F, N) arrays
         Of this epoch [m].
     first, second : (B,) int arrays
@@ -231,33 +219,34 @@ def followed(before_m, unseen_s, residual_m, sigma_m, first, second, shift_m, du
     dt_s, max_gap_s, k : float
         Time since the epoch before, longest gap, multiplier of the threshold.
     wavelength_m : (F,) array
-
-    Returns
-    -------
-    followed_m, unseen_s : (B, F, N) arrays
-    statistic, threshold : (N,) arrays
-        Of the baseline and band that is worst [m].
+    found : (2, N) array
+        Filled in: size and threshold of the baseline and band that is worst [m].
     failed : (N,) bool array
+        Filled in.
     """
     n_baselines, n_bands, n_sats = residual_m.shape
-    after, unseen = np.empty(residual_m.shape), np.empty(residual_m.shape)
-    size, threshold = np.empty(residual_m.shape), np.empty(residual_m.shape)
     for row in range(n_baselines):
         for band in range(n_bands):
             for sat in range(n_sats):
-                elapsed = unseen_s[row, band, sat] + dt_s
-                before = before_m[row, band, sat] + (shift_m[second[row], sat] - shift_m[first[row], sat])
+                elapsed = before[1, row, band, sat] + dt_s
+                earlier = before[0, row, band, sat] + (shift_m[second[row], sat] - shift_m[first[row], sat])
                 now = residual_m[row, band, sat]
-                threshold[row, band, sat] = k * sigma_m[row, band, sat]
                 if not np.isfinite(now):
-                    after[row, band, sat], unseen[row, band, sat], size[row, band, sat] = before, elapsed, np.nan
+                    after[0, row, band, sat], after[1, row, band, sat] = earlier, elapsed
                     continue
                 if 0.0 < elapsed <= max_gap_s:
-                    now += wavelength_m[band] * np.rint((before - now) / wavelength_m[band])
-                after[row, band, sat], unseen[row, band, sat], size[row, band, sat] = now, 0.0, np.abs(now)
-    place = deciding(size, threshold, False)
-    statistic, limit = picked(size, place), picked(threshold, place)
-    failed = np.empty(n_sats, dtype=np.bool_)
+                    now += wavelength_m[band] * np.rint((earlier - now) / wavelength_m[band])
+                after[0, row, band, sat], after[1, row, band, sat] = now, 0.0
+    found[:] = np.nan
+    ratio = np.empty((n_baselines, n_bands))
+    for sat in range(n_sats if n_baselines > 0 else 0):
+        for row in range(n_baselines):
+            for band in range(n_bands):
+                size = np.abs(after[0, row, band, sat]) / (k * sigma_m[row, band, sat])
+                ratio[row, band] = size if np.isfinite(residual_m[row, band, sat]) else np.nan
+        row, band = deciding(ratio, False)
+        found[1, sat] = k * sigma_m[row, band, sat]
+        if np.isfinite(residual_m[row, band, sat]):
+            found[0, sat] = np.abs(after[0, row, band, sat])
     for sat in range(n_sats):
-        failed[sat] = due[sat] and np.isfinite(statistic[sat]) and not statistic[sat] <= limit[sat]
-    return after, unseen, statistic, limit, failed
+        failed[sat] = due[sat] and np.isfinite(found[0, sat]) and not found[0, sat] <= found[1, sat]

@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-call, no-untyped-def"
 """The middle of the values that are there."""
 
 from __future__ import annotations
@@ -5,11 +6,10 @@ from __future__ import annotations
 import numpy as np
 
 from gbas_core.compiled import compiled
-from gbas_core.record import FloatArray
 
 
 @compiled
-def median(values: FloatArray) -> float:
+def median(values):
     """Median of the finite values ``(N,)``; NaN without any."""
     there = values[np.isfinite(values)]
     if len(there) == 0:

@@ -10,37 +10,20 @@ from gbas_ground.monitors.kernels.interpolation import interpolated
 
 
 @compiled
-def averaged(mean_dbhz, unseen_s, cn0_dbhz, bands, dt_s, average_s, max_gap_s):
-    """Exponential averages of the channels that have C/N0 now.
-
-    Parameters
-    ----------
-    mean_dbhz, unseen_s : (R, F, N) arrays
-        Averages, and time since C/N0 was last there.
-    cn0_dbhz : (R, N_BANDS, N) array
-    bands : (F,) int array
-    dt_s, average_s, max_gap_s : float
-
-    Returns
-    -------
-    now_dbhz : (R, F, N) array
-        NaN where there is no C/N0 now.
-    mean_dbhz, unseen_s : (R, F, N) arrays
-        To remember.
-    """
-    now, mean, unseen = np.empty(mean_dbhz.shape), np.empty(mean_dbhz.shape), np.empty(mean_dbhz.shape)
-    for row in range(mean_dbhz.shape[0]):
-        for place in range(mean_dbhz.shape[1]):
-            for sat in range(mean_dbhz.shape[2]):
-                value, before = cn0_dbhz[row, bands[place], sat], mean_dbhz[row, place, sat]
-                elapsed = unseen_s[row, place, sat] + dt_s
+def _average(before, cn0_dbhz, bands, dt_s, average_s, max_gap_s, after, now):
+    """Exponential averages of the channels: ``before``, ``after`` (2, R, F, N), ``now`` (R, F, N) without the old."""
+    for row in range(now.shape[0]):
+        for place in range(now.shape[1]):
+            for sat in range(now.shape[2]):
+                value, mean = cn0_dbhz[row, bands[place], sat], before[0, row, place, sat]
+                elapsed = before[1, row, place, sat] + dt_s
+                now[row, place, sat] = np.nan
                 if not np.isfinite(value):
-                    now[row, place, sat], mean[row, place, sat], unseen[row, place, sat] = np.nan, before, elapsed
+                    after[0, row, place, sat], after[1, row, place, sat] = mean, elapsed
                     continue
                 if 0.0 < elapsed <= max_gap_s:
-                    value = before + min(elapsed / average_s, 1.0) * (value - before)
-                now[row, place, sat], mean[row, place, sat], unseen[row, place, sat] = value, value, 0.0
-    return now, mean, unseen
+                    value = mean + min(elapsed / average_s, 1.0) * (value - mean)
+                now[row, place, sat], after[0, row, place, sat], after[1, row, place, sat] = value, value, 0.0
 
 
 @compiled
@@ -65,39 +48,38 @@ def _learnt(learnt_dbhz, learnt_s, taken, band, place, after_s):
 
 
 @compiled
-def tested(
-    mean_dbhz, cn0_dbhz, bands, due, elevation_rad, nodes_rad, minimum_dbhz, margin_db, learn, drop_db, after_s,
-    learnt_dbhz, learnt_s, width_rad,
+def step(
+    before, learnt, cn0_dbhz, due, elevation_rad, bands, nodes_rad, minimum_dbhz, margin_db, learn, drop_db, after_s,
+    width_rad, dt_s, average_s, max_gap_s, after, channels, channels_failed, satellites, satellites_failed,
 ):  # fmt: skip
     """Averages against the table, and against what was learnt where that is higher.
 
     Parameters
     ----------
-    mean_dbhz : (R, F, N) array
-        From :func:`averaged`.
-    cn0_dbhz, bands
-        As there.
+    before, after : (2, R, F, N) arrays
+        Averages, and time since C/N0 was last there; `after` is filled in.
+    learnt : (2, R, F, E) array
+        Mean of each bin of elevation, and time learnt.
+    cn0_dbhz : (R, N_BANDS, N) array
     due : (R, N) bool array
     elevation_rad : (N,) array
+    bands : (F,) int array
     nodes_rad, minimum_dbhz : (K,) and (F, K) arrays
         The table.
-    margin_db, drop_db, after_s, width_rad : float
+    margin_db, drop_db, after_s, width_rad, dt_s, average_s, max_gap_s : float
     learn : bool
-    learnt_dbhz, learnt_s : (R, F, E) arrays
-
-    Returns
-    -------
     channels : (2, R, F, N) array
-        Minus C/N0 and minus its minimum.
-    channels_failed, wanted : (R, F, N) bool arrays
+        Filled in: minus C/N0 and minus its minimum.
+    channels_failed : (R, F, N) bool array
+        Filled in.
     satellites : (2, F, N) array
-        The same of the means over the receivers.
+        Filled in: the same of the means over the receivers.
     satellites_failed : (F, N) bool array
+        Filled in.
     """
-    n_receivers, n_bands, n_sats = mean_dbhz.shape
-    channels = np.empty((2, n_receivers, n_bands, n_sats))
-    channels_failed, wanted = np.empty(mean_dbhz.shape, dtype=np.bool_), np.empty(mean_dbhz.shape, dtype=np.bool_)
-    satellites, satellites_failed = np.empty((2, n_bands, n_sats)), np.empty((n_bands, n_sats), dtype=np.bool_)
+    _, n_receivers, n_bands, n_sats = channels.shape
+    mean_dbhz = channels[0]
+    _average(before, cn0_dbhz, bands, dt_s, average_s, max_gap_s, after, mean_dbhz)
     taken = np.empty(n_receivers, dtype=np.bool_)
     for band in range(n_bands):
         for sat in range(n_sats):
@@ -106,7 +88,7 @@ def tested(
             for row in range(n_receivers):
                 mean = mean_dbhz[row, band, sat]
                 asked = due[row, sat] and (band == 0 or np.isfinite(cn0_dbhz[row, bands[band], sat]))
-                wanted[row, band, sat], taken[row] = asked, asked and np.isfinite(mean)
+                taken[row] = asked and np.isfinite(mean)
                 channels[0, row, band, sat], channels[1, row, band, sat] = -mean, -(least - margin_db)
                 channels_failed[row, band, sat] = asked and not -mean <= -(least - margin_db)
                 expected = expected or asked
@@ -114,22 +96,24 @@ def tested(
                     total += mean
                     count += 1
             if learn:
-                place = elevation_bin(elevation_rad[sat], width_rad, learnt_s.shape[2])
-                least = np.maximum(least, _learnt(learnt_dbhz, learnt_s, taken, band, place, after_s) - drop_db)
+                place = elevation_bin(elevation_rad[sat], width_rad, learnt.shape[3])
+                least = np.maximum(least, _learnt(learnt[0], learnt[1], taken, band, place, after_s) - drop_db)
             average = total / count if count > 0 else np.nan
             satellites[0, band, sat], satellites[1, band, sat] = -average, -least
             satellites_failed[band, sat] = expected and not -average <= -least
-    return channels, channels_failed, wanted, satellites, satellites_failed
 
 
 @compiled
-def taught(
-    learnt_dbhz, learnt_s, cn0_dbhz, bands, wanted, channels_failed, satellites_failed, elevation_rad, dt_s, learn_s,
-    width_rad,
-):  # fmt: skip
-    """What is known after this epoch ``(R, F, E)``: a mean at first, an exponential one later."""
-    n_receivers, n_bands, n_bins = learnt_s.shape
-    known, known_s = learnt_dbhz.copy(), learnt_s.copy()
+def teach(
+    learnt, cn0_dbhz, bands, due, channels_failed, satellites_failed, elevation_rad, dt_s, learn_s, width_rad, after
+):
+    """What is known after this epoch, into ``(2, R, F, E)``: a mean at first, an exponential one later.
+
+    Taught by channels that are due and do not fail, nor their satellite.
+    """
+    _, n_receivers, n_bands, n_bins = learnt.shape
+    after[:] = learnt
+    known, known_s = after[0], after[1]
     total, number = np.empty(n_bins), np.empty(n_bins)
     for row in range(n_receivers):
         for band in range(n_bands):
@@ -138,7 +122,7 @@ def taught(
             for sat in range(len(elevation_rad)):
                 value = cn0_dbhz[row, bands[band], sat]
                 fails = channels_failed[row, band, sat] or satellites_failed[band, sat]
-                if wanted[row, band, sat] and np.isfinite(value) and not fails:
+                if due[row, sat] and np.isfinite(value) and not fails:
                     place = elevation_bin(elevation_rad[sat], width_rad, n_bins)
                     total[place] += value
                     number[place] += 1.0
@@ -148,7 +132,6 @@ def taught(
                     weight = max(dt_s / max(known_s[row, band, place], dt_s), dt_s / learn_s)
                     mean = total[place] / number[place]
                     known[row, band, place] += weight * (mean - known[row, band, place])
-    return known, known_s
 
 
 @compiled

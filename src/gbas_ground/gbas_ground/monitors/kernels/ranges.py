@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-call, no-untyped-def"
-"""Carriers that several receivers lose count of; raw ranges against the expected ones."""
+"""Which channels are judged together; carriers that several receivers lose count of; raw against expected ranges."""
 
 from __future__ import annotations
 
@@ -10,26 +10,23 @@ from gbas_ground.monitors.kernels.median import median
 
 
 @compiled
-def common_slips(slipped, tracked, due, most_share):
-    """Receivers with a slip ``(N,)``, and the satellites that are due and slip at several, unless most do.
+def common_slips(slipped, tracked, due, most_share, number, failed):
+    """Receivers with a slip, into ``number`` (N,), and the satellites that are due and slip at several, unless most do.
 
-    ``slipped``, ``tracked`` (R, N).
+    ``slipped``, ``tracked`` (R, N); ``failed`` (N,).
     """
     n_sats = len(due)
-    number, failed = np.zeros(n_sats), np.zeros(n_sats, dtype=np.bool_)
     several, seen = 0, 0
     for sat in range(n_sats):
-        any_tracked = False
+        any_tracked, number[sat] = False, 0.0
         for row in range(len(slipped)):
             any_tracked = any_tracked or tracked[row, sat]
             if slipped[row, sat] and tracked[row, sat]:
                 number[sat] += 1.0
         several += 1 if number[sat] > 1.0 else 0
         seen += 1 if any_tracked else 0
-    if several <= most_share * max(1, seen):
-        for sat in range(n_sats):
-            failed[sat] = due[sat] and number[sat] > 1.0
-    return number, failed
+    for sat in range(n_sats):
+        failed[sat] = due[sat] and number[sat] > 1.0 and several <= most_share * max(1, seen)
 
 
 @compiled
@@ -48,3 +45,16 @@ def expected_ranges(raw_correction_m, tracked, groups, limit_m):
                     size[row, sat] = np.abs(own[sat] - middle)
                     failed[row, sat] = tracked[row, sat] and not size[row, sat] <= limit_m
     return size, failed
+
+
+@compiled
+def common_channels(ready, failed, groups, least, steady):
+    """Ready channels ``(R, N)`` that nothing has failed, of constellations with enough ready ones at the receiver."""
+    for row in range(len(ready)):
+        for group in range(len(groups)):
+            number = 0
+            for sat in range(ready.shape[1]):
+                number += 1 if ready[row, sat] and groups[group, sat] else 0
+            for sat in range(ready.shape[1]):
+                if groups[group, sat]:
+                    steady[row, sat] = ready[row, sat] and number >= least and not failed[row, sat]

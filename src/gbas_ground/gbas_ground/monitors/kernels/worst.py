@@ -19,30 +19,25 @@ def excess(statistic, threshold):
 
 
 @compiled
-def worst_along(statistic, threshold, failed):
+def worst_along(statistic, threshold, failed, worst, fails):
     """Of each test and satellite the comparison furthest over its threshold, or nearest to it: the first of equals.
 
     Parameters
     ----------
     statistic, threshold : (T, M, N) arrays
     failed : (T, M, N) bool array
-
-    Returns
-    -------
-    statistic, threshold : (T, N) arrays
-    failed : (T, N) bool array
-        Whether any did.
+    worst : (2, T, N) array
+        Filled in: its statistic and threshold.
+    fails : (T, N) bool array
+        Filled in: whether any did.
     """
     n_tests, count, n_sats = statistic.shape
-    worst, limit = np.empty((n_tests, n_sats)), np.empty((n_tests, n_sats))
-    fails = np.zeros((n_tests, n_sats), dtype=np.bool_)
     for test in range(n_tests):
         for sat in range(n_sats):
-            place, largest = 0, -np.inf
+            place, largest, fails[test, sat] = 0, -np.inf, False
             for each in range(count):
                 over = excess(statistic[test, each, sat], threshold[test, each, sat])
                 if over > largest:
                     place, largest = each, over
                 fails[test, sat] |= failed[test, each, sat]
-            worst[test, sat], limit[test, sat] = statistic[test, place, sat], threshold[test, place, sat]
-    return worst, limit, fails
+            worst[0, test, sat], worst[1, test, sat] = statistic[test, place, sat], threshold[test, place, sat]
