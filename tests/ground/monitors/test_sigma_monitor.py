@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, norm
 
-from gbas_core.satellites import N_SATS
 from array_corrections import b_failures
+from gbas_core.satellites import N_SATS
 from gbas_ground.monitors.sigma_monitor import (
     SigmaMonitorParams,
     estimate_distribution,

@@ -22,6 +22,7 @@ from gbas_vdb.transmission.schedule import (
     ScheduleParams,
     ScheduleState,
     SourceCorrection,
+    Sources,
     schedule_frame,
     sources_that_fit,
 )
@@ -95,7 +96,7 @@ def frames(
         frame = Frame(
             gps_week=2300,
             tow_s=100.0 + 0.5 * number,
-            sources=tuple(sources(number)),
+            sources=Sources.of(sources(number)),
             station=station(number),
             approaches=tuple(approaches),
             predictions=predictions,

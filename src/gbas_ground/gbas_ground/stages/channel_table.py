@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Final
 
-import numpy as np
-
 from gbas_core.record import FloatArray
 from gbas_core.satellites import missing
 from gbas_ground.stages.decide import Decided

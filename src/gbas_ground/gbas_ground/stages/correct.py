@@ -12,11 +12,11 @@ from gbas_core.record import BoolArray, FloatArray
 from gbas_core.signals import L1
 from gbas_ground.channels.predicted_ranges import Site, predict_ranges
 from gbas_ground.consistency import (
+    Checks,
     CorrectionInputs,
     Corrections,
     Exclusions,
     Finding,
-    Checks,
     readmission_state,
     resolve_consistency,
 )

@@ -11,39 +11,38 @@ limits (alert limits, maximum distance, availability) round down, so that quanti
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 from operator import attrgetter
 from types import SimpleNamespace
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, overload
 
-from gbas_vdb.coding.bits import BitReader, BitWriter
+import numpy as np
+
+from gbas_core.compiled import as_written
+from gbas_core.record import FloatArray, IntArray
+from gbas_vdb.coding.bits import BitReader, BitWriter, byte_array
 from gbas_vdb.errors import FieldError, VdbError
-
-# A value that was computed from counts (0.02 * 3) must round up to the same counts: this part of one count is allowed.
-_ROUNDING_SLACK: Final = 1e-6
-
-# Nothing on the VDB is larger than this; beyond it arithmetic could overflow before the bounds are looked at.
-_LARGEST: Final = 1e15
-
-# Fields up to this long are decoded by a table.
-_TABULATED_BITS: Final = 8
-_REFUSED: Final = object()
+from gbas_vdb.messages.kernels.numbers import (
+    DOWN,
+    LARGEST,
+    NEAREST,
+    NO_CODE,
+    UP,
+    Places,
+    counts_of,
+    pack,
+    quantity_of,
+    unpack,
+)
 
 Rounding = Literal["nearest", "up", "down"]
 
 
-def _rounded_up(counts: float) -> int:
-    return math.ceil(counts - _ROUNDING_SLACK)
-
-
-def _rounded_down(counts: float) -> int:
-    return math.floor(counts + _ROUNDING_SLACK)
-
-
-_ROUNDED: Final[dict[Rounding, Callable[[float], int]]] = {"nearest": round, "up": _rounded_up, "down": _rounded_down}
+_ROUNDINGS: Final[dict[Rounding, int]] = {"nearest": NEAREST, "up": UP, "down": DOWN}
+_counts_of, _quantity_of = as_written(counts_of), as_written(quantity_of)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,6 +68,8 @@ class Number:
     rounding
     valid_if : str or None
         Name of another entry: when that one is missing (or an empty group), this one is missing too, and sent as zero.
+    counts : bool
+        It says how many items the group of its name has.
     """
 
     name: str
@@ -84,6 +85,7 @@ class Number:
     saturates: bool = False
     rounding: Rounding = "nearest"
     valid_if: str | None = None
+    counts: bool = False
 
     @cached_property
     def bounds(self) -> tuple[int, int]:
@@ -92,7 +94,8 @@ class Number:
         return (low if self.minimum is None else self.minimum, high if self.maximum is None else self.maximum)
 
     @cached_property
-    def _ratio(self) -> tuple[float, float]:
+    def ratio(self) -> tuple[float, float]:
+        """Value of one count, as numerator and denominator."""
         if isinstance(self.scale, Fraction):
             return float(self.scale.numerator), float(self.scale.denominator)
         return (1.0 if self.scale is None else float(self.scale)), 1.0
@@ -113,9 +116,7 @@ class Number:
         """Physical value of a raw count."""
         if self.scale is None:
             return raw + self.offset
-        # The offset is added before the division: one rounding, so that decimal values come out as they are written.
-        numerator, denominator = self._ratio
-        return (self.offset * denominator + raw * numerator) / denominator
+        return _quantity_of(raw, *self.ratio, self.offset)
 
     def to_raw(self, value: Any) -> int:
         """Raw count of a physical value.
@@ -127,16 +128,11 @@ class Number:
         """
         if value is None or value != value or value in (math.inf, -math.inf):
             return self._special(value)
-        if not -_LARGEST < value < _LARGEST:
+        if not -LARGEST < value < LARGEST:
             raise self._out_of_bounds(value)
-        numerator, denominator = self._ratio
-        counts = (value - self.offset) * denominator / numerator
-        if self.scale is None:
-            raw = int(value) - self.offset
-            if raw != counts:
-                raise FieldError(f"{self.name} = {value!r} is not an integer")
-        else:
-            raw = _ROUNDED[self.rounding](counts)
+        raw = _counts_of(value, *self.ratio, self.offset, _ROUNDINGS[self.rounding])
+        if self.scale is None and raw + self.offset != value:
+            raise FieldError(f"{self.name} = {value!r} is not an integer")
         low, high = self.bounds
         if low <= raw <= high and raw not in self.codes:
             return raw
@@ -177,51 +173,15 @@ class Number:
             raise self._out_of_bounds(self.physical(raw))
         return self.physical(raw)
 
+    @cached_property
+    def missing_value(self) -> float | None:
+        """The same where there is a code for it, as the code has it."""
+        return next((value for value in self.codes.values() if is_missing(value)), self.missing)
+
     @property
     def missing(self) -> float | None:
         """What stands for a missing value: None for integers, NaN for quantities."""
         return None if self.scale is None else math.nan
-
-    @cached_property
-    def quick_raw(self) -> Callable[[Any], int | None]:
-        """:meth:`to_raw` for ordinary values; gives None for all others, which are to_raw's business."""
-        (low, high), offset, codes = self.bounds, self.offset, self.codes
-        numerator, denominator = self._ratio
-        roundings: dict[str, Callable[[float], int]] = {"nearest": round, "up": _rounded_up, "down": _rounded_down}
-        rounded = roundings[self.rounding]
-
-        def integer(value: Any) -> int | None:
-            if type(value) is not int:
-                return None
-            raw = value - offset
-            return raw if low <= raw <= high and raw not in codes else None
-
-        def quantity(value: Any) -> int | None:
-            if type(value) is not float or not -_LARGEST < value < _LARGEST:
-                return None
-            raw = rounded((value - offset) * denominator / numerator)
-            return raw if low <= raw <= high and raw not in codes else None
-
-        return integer if self.scale is None else quantity
-
-    @cached_property
-    def quick_value(self) -> Callable[[int], Any]:
-        """:meth:`from_raw`; of short fields all values are made once."""
-        if self.bits > _TABULATED_BITS:
-            return self.from_raw
-        values = [self._value_or_refused(raw) for raw in range(1 << self.bits)]
-
-        def tabulated(raw: int) -> Any:
-            value = values[raw]
-            return self.from_raw(raw) if value is _REFUSED else value
-
-        return tabulated
-
-    def _value_or_refused(self, raw: int) -> Any:
-        try:
-            return self.from_raw(raw)
-        except FieldError:
-            return _REFUSED
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -413,10 +373,26 @@ class Layout:
         return tuple(entry for entry in self.entries if isinstance(entry, Switch))
 
     @cached_property
-    def fixed(self) -> FixedPlaces | None:
-        """The quick codec, where every field is a number at a fixed place; None elsewhere."""
-        simple = all(isinstance(entry, Number | Spare | Vector) for entry in self.entries)
-        return FixedPlaces(self) if simple else None
+    def leading(self) -> tuple[Entry, ...]:
+        """All entries, but for a group at the end."""
+        return self.entries[:-1] if isinstance(self.entries[-1], Group) else self.entries
+
+    @cached_property
+    def group(self) -> Group | None:
+        """A group of fixed items at the end."""
+        last = self.entries[-1]
+        return last if isinstance(last, Group) and last.layout.is_fixed and last.layout.group is None else None
+
+    @cached_property
+    def is_fixed(self) -> bool:
+        """Whether every field is a number at a fixed place, in whole bytes, but for such a group at the end."""
+        simple = all(isinstance(entry, Number | Spare | Vector | Count) for entry in self.leading)
+        return simple and self.bits % 8 == 0 and (self.leading == self.entries or self.group is not None)
+
+    @cached_property
+    def places(self) -> FixedPlaces:
+        """The codec of whole tables, where fields are fixed."""
+        return FixedPlaces(self)
 
 
 def _bits_of(entry: Entry) -> int:
@@ -434,60 +410,168 @@ def _bits_of(entry: Entry) -> int:
 
 
 class FixedPlaces:
-    """Codec of a layout of numbers whose places do not depend on the record: bits move as one integer.
+    """Codec of a layout of numbers whose places do not depend on the record: whole tables of records at once.
 
-    Corrections are by far the most of what is sent, and all of this kind: this costs a third of going entry by entry.
+    Corrections are by far the most of what is sent, and all of this kind.
 
     Attributes
     ----------
-    n_bits : int
-        Of the whole layout.
+    n_numbers : int
+    places : Places
+        As the compiled loops have it.
     """
 
     def __init__(self, layout: Layout) -> None:
         self._record = layout.record
-        self._conditional = tuple((number.name, str(number.valid_if), number.missing) for number in layout.conditional)
-        self._numbers: list[tuple[Number, int, int]] = []
-        self._vectors: list[tuple[Vector, tuple[int, ...], int]] = []
-        at = 0
-        for entry in layout.entries:
+        entries = [_number_of(entry) if isinstance(entry, Count) else entry for entry in layout.leading]
+        self._entries = [entry for entry in entries if isinstance(entry, Number | Vector)]
+        self._numbers: list[Number] = []
+        at, begins = 0, []
+        for entry in entries:
+            items = [entry.item] * entry.length if isinstance(entry, Vector) else [entry]
+            for item in items:
+                if isinstance(item, Number):
+                    self._numbers.append(item)
+                    begins.append(at)
+                at += _bits_of(item)
+        self.n_numbers = len(self._numbers)
+        self.places = _places(self._numbers, begins, at // 8)
+
+    def row_of(self, record: Any) -> list[Any]:
+        """The numbers of a record, in the order of the columns."""
+        row = []
+        for entry in self._entries:
+            value = getattr(record, entry.name)
             if isinstance(entry, Vector):
-                places = tuple(at + index * entry.item.bits for index in range(entry.length))
-                self._vectors.append((entry, places, (1 << entry.item.bits) - 1))
-                at += entry.length * entry.item.bits
+                _check_length(entry, value)
+                row.extend(value)
             else:
-                assert isinstance(entry, Number | Spare)
-                if isinstance(entry, Number):
-                    self._numbers.append((entry, at, (1 << entry.bits) - 1))
-                at += entry.bits
-        self.n_bits = at
+                row.append(len(value) or None if entry.counts else value)
+        return row
 
-    def encode(self, record: Any) -> int:
-        """The record's bits; raises FieldError as :func:`encode` does."""
-        bits = 0
-        for entry, place, mask in self._numbers:
-            raw = entry.quick_raw(getattr(record, entry.name))
-            if raw is None:
-                raw = _number_to_raw(entry, record)
-            bits |= (raw & mask) << place
-        for vector, places, mask in self._vectors:
-            values, item = getattr(record, vector.name), vector.item
-            _check_length(vector, values)
-            for value, place in zip(values, places, strict=True):
-                raw = item.quick_raw(value)
-                bits |= ((item.to_raw(value) if raw is None else raw) & mask) << place
-        return bits
+    def values(self, row: FloatArray) -> dict[str, Any]:
+        """The fields of the record of ``(F,)`` numbers."""
+        values, numbers, at = {}, row.tolist(), 0
+        for entry in self._entries:
+            if isinstance(entry, Vector):
+                end = at + entry.length
+                values[entry.name] = tuple([_value(entry.item, each) for each in numbers[at:end]])
+            else:
+                end = at + 1
+                values[entry.name] = _value(entry, numbers[at])
+            at = end
+        return values
 
-    def decode(self, bits: int) -> Any:
-        """The record of its bits; raises FieldError as :func:`decode` does."""
-        values = {entry.name: entry.quick_value(bits >> place & mask) for entry, place, mask in self._numbers}
-        for vector, places, mask in self._vectors:
-            value_of = vector.item.quick_value
-            values[vector.name] = tuple([value_of(bits >> place & mask) for place in places])
-        for name, valid_if, missing in self._conditional:
-            if is_missing(values[valid_if]):
-                values[name] = missing
-        return self._record(**values)
+    def unpack(self, data: bytes) -> FloatArray:
+        """Numbers ``(n, F)`` of their bits; raises FieldError as :func:`decode` does."""
+        rows, refused, raw = unpack(byte_array(data), self.places)
+        if refused >= 0:
+            number = self._numbers[refused % self.n_numbers]
+            number.from_raw(raw)
+            raise FieldError(f"{number.name}: count {raw} is not allowed")
+        return rows
+
+    def record(self, row: FloatArray) -> Any:
+        """The record of ``(F,)`` numbers."""
+        return self._record(**self.values(row))
+
+
+def _number_of(count: Count) -> Number:
+    """How many items a group has, as a number that is missing when there are none."""
+    return Number(name=count.of, bits=count.bits, maximum=count.maximum, codes={0: None}, counts=True)
+
+
+def _value(number: Number, value: float) -> Any:
+    """A number as a record has it: missing is one object, so that records compare by value."""
+    if value != value:
+        return number.missing_value
+    return int(value) if number.scale is None else value
+
+
+def _places(numbers: Sequence[Number], begins: Sequence[int], n_bytes: int) -> Places:
+    names = [number.name for number in numbers]
+
+    def code(number: Number, wanted: Callable[[Any], bool]) -> int:
+        return next((raw for raw, value in number.codes.items() if wanted(value)), NO_CODE)
+
+    def whole(values: Iterable[int]) -> IntArray:
+        return np.array(list(values), dtype=np.int64)
+
+    return Places(
+        at=whole(begins),
+        bits=whole(number.bits for number in numbers),
+        numerator=np.array([number.ratio[0] for number in numbers]),
+        denominator=np.array([number.ratio[1] for number in numbers]),
+        offset=np.array([float(number.offset) for number in numbers]),
+        rounding=whole(_ROUNDINGS[number.rounding] for number in numbers),
+        low=whole(number.bounds[0] for number in numbers),
+        high=whole(number.bounds[1] for number in numbers),
+        of_missing=whole(code(number, is_missing) for number in numbers),
+        of_infinity=whole(code(number, lambda value: value == math.inf) for number in numbers),
+        integer=np.array([number.scale is None for number in numbers]),
+        signed=np.array([number.signed for number in numbers]),
+        saturates=np.array([number.saturates for number in numbers]),
+        valid_if=whole(-1 if number.valid_if is None else names.index(number.valid_if) for number in numbers),
+        n_bytes=n_bytes,
+    )
+
+
+class Items(Sequence[Any]):
+    """Records of a layout of numbers at fixed places, as a table; a record is made when it is asked for.
+
+    Equal to a tuple of equal records.
+
+    Attributes
+    ----------
+    layout : Layout
+    rows : (n, F) array
+        Their numbers in the order of transmission; NaN for what is missing. Not to be written to.
+    """
+
+    __slots__ = ("layout", "rows")
+
+    def __init__(self, layout: Layout, rows: FloatArray) -> None:
+        self.layout, self.rows = layout, rows
+
+    @classmethod
+    def of(cls, layout: Layout, records: Sequence[Any]) -> Items:
+        """The same as a table."""
+        if isinstance(records, cls):
+            return records
+        numbers = [layout.places.row_of(record) for record in records]
+        return cls(layout, np.array(numbers, dtype=np.float64).reshape(len(numbers), layout.places.n_numbers))
+
+    @overload
+    def __getitem__(self, index: int) -> Any: ...
+    @overload
+    def __getitem__(self, index: slice) -> Items: ...
+    def __getitem__(self, index: int | slice) -> Any:
+        if isinstance(index, slice):
+            return Items(self.layout, self.rows[index])
+        return self.layout.places.record(self.rows[index])
+
+    def take(self, rows: Sequence[int]) -> Items:
+        """Some of them, in this order."""
+        return Items(self.layout, self.rows[rows])
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __add__(self, other: Sequence[Any]) -> Items:
+        return Items(self.layout, np.concatenate([self.rows, Items.of(self.layout, other).rows]))
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Items | tuple) or len(other) != len(self):
+            return False
+        if isinstance(other, Items) and other.layout is self.layout:
+            return np.array_equal(other.rows, self.rows, equal_nan=True)
+        return tuple(self) == tuple(other)
+
+    def __hash__(self) -> int:
+        return hash(tuple(self))
+
+    def __repr__(self) -> str:
+        return repr(tuple(self))
 
 
 def is_missing(value: Any) -> bool:
@@ -503,7 +587,14 @@ def encode(layout: Layout, record: Any, writer: BitWriter) -> None:
     FieldError
         Naming the field, its value and the bound; group items are named with their position.
     """
-    for entry in layout.entries:
+    if layout.group is not None and layout.is_fixed:
+        row = np.array([layout.places.row_of(record)], dtype=np.float64)
+        data, refused = pack(row, layout.places.places)
+        if refused < 0:
+            writer.put(int.from_bytes(data.tobytes(), "little"), layout.bits)
+            _encode_group(layout.group, getattr(record, layout.group.name), writer)
+            return
+    for entry in layout.entries:  # or what cannot be sent is told here
         if isinstance(entry, Number):
             writer.put(_number_to_raw(entry, record), entry.bits)
         elif isinstance(entry, (Choice, Letter, Text)):
@@ -545,21 +636,19 @@ def _encode_vector(entry: Vector, values: Any, writer: BitWriter) -> None:
 
 
 def _encode_group(entry: Group, items: Any, writer: BitWriter) -> None:
+    if isinstance(items, Items):
+        data, refused = pack(items.rows, entry.layout.places.places)
+        if refused < 0:
+            writer.put(int.from_bytes(data.tobytes(), "little"), 8 * len(data))
+            return
     # Each item is collected apart: shifting a short integer is cheaper than shifting the whole message.
     for position, item in enumerate(items):
+        part = BitWriter()
         try:
-            bits, n_bits = _item_bits(entry.layout, item)
+            encode(entry.layout, item, part)
         except FieldError as error:
             raise FieldError(f"{entry.name}[{position}]: {error}") from None
-        writer.put(bits, n_bits)
-
-
-def _item_bits(layout: Layout, item: Any) -> tuple[int, int]:
-    if layout.fixed is not None:
-        return layout.fixed.encode(item), layout.fixed.n_bits
-    part = BitWriter()
-    encode(layout, item, part)
-    return part.value, part.n_bits
+        writer.put(part.value, part.n_bits)
 
 
 def decode(layout: Layout, reader: BitReader) -> Any:
@@ -579,8 +668,20 @@ def decode(layout: Layout, reader: BitReader) -> Any:
 
 
 def _decode(layout: Layout, reader: BitReader) -> Any:
-    if layout.fixed is not None:
-        return layout.fixed.decode(reader.take(layout.fixed.n_bits))
+    if layout.group is not None and layout.is_fixed and reader.remaining >= layout.bits:
+        begin, n_bytes = reader.position, layout.bits // 8
+        rows, refused, _ = unpack(
+            byte_array(reader.take(layout.bits).to_bytes(n_bytes, "little")), layout.places.places
+        )
+        if refused < 0:
+            values = layout.places.values(rows[0])
+            values[layout.group.name] = _decoded_group(layout.group.layout, values[layout.group.name] or 0, reader)
+            return layout.record(**values)
+        reader.position = begin  # what is not allowed is told below
+    return _decode_entries(layout, reader)
+
+
+def _decode_entries(layout: Layout, reader: BitReader) -> Any:
     values: dict[str, Any] = {}
     counts: dict[str, int] = {}
     raw_of_switch: dict[int, int] = {}
@@ -595,7 +696,7 @@ def _decode(layout: Layout, reader: BitReader) -> Any:
         elif isinstance(entry, Count):
             counts[entry.of] = _checked_count(entry, reader.take(entry.bits))
         elif isinstance(entry, Group):
-            values[entry.name] = tuple([_decode(entry.layout, reader) for _ in range(counts[entry.name])])
+            values[entry.name] = _decoded_group(entry.layout, counts[entry.name], reader)
         elif isinstance(entry, Switch):
             raw_of_switch[id(entry)] = reader.take(entry.default.bits)
         else:
@@ -606,6 +707,13 @@ def _decode(layout: Layout, reader: BitReader) -> Any:
         if is_missing(values[str(number.valid_if)]):
             values[number.name] = number.missing
     return layout.record(**values)
+
+
+def _decoded_group(layout: Layout, count: int, reader: BitReader) -> Sequence[Any]:
+    if layout.is_fixed and count:
+        n_bytes = count * layout.bits // 8
+        return Items(layout, layout.places.unpack(reader.take(8 * n_bytes).to_bytes(n_bytes, "little")))
+    return tuple([_decode(layout, reader) for _ in range(count)])
 
 
 def _checked_count(entry: Count, count: int) -> int:

@@ -109,7 +109,10 @@ def _sent(known: SourceHistory, frame: int) -> SourceHistory:
 
 
 def _next(history: Mapping[int, SourceHistory], chosen: Sequence[int], frame: int, places: int) -> tuple[int, bool]:
-    waiting = sorted((source for source in history if source not in chosen), key=lambda s: (history[s].due, s))
+    waiting = [source for source in history if source not in chosen]
+    if all(history[source].sent and not history[source].changed for source in waiting):
+        return min(waiting, key=lambda s: (history[s].due, s)), False
+    waiting.sort(key=lambda s: (history[s].due, s))
     for source in waiting:
         if history[source].changed and _others_keep_limit(history, waiting, chosen, source, frame, places, 3):
             return source, True

@@ -12,13 +12,14 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Final
+from typing import Final, NamedTuple, cast
 
 from gbas_core.gnss.gpstime import modified_z_count_s
 from gbas_vdb.coding.fec import MAX_APPLICATION_BYTES, encode_fec
 from gbas_vdb.errors import ScheduleError
 from gbas_vdb.messages import tables
 from gbas_vdb.messages.block import CRC_BYTES, HEADER_BYTES, MAX_BLOCK_BYTES, encode_block, encode_body, wrap_body
+from gbas_vdb.messages.fields import Items
 from gbas_vdb.messages.types import (
     Correction30,
     Correction100,
@@ -133,13 +134,66 @@ class SourceCorrection:
         return self.type1.ranging_source_id
 
 
+class Sources(NamedTuple):
+    """All there is to broadcast of the ranging sources in a frame, as columns of one length.
+
+    Attributes
+    ----------
+    numbers, iods, ephemeris_crcs : list of int
+    corrections : mapping of int to Items
+        By the type of the message that carries them.
+    decorrelation : mapping of int to list of float
+        P of each message [m/m].
+    availability_s : list of float or None
+    """
+
+    numbers: Sequence[int]
+    iods: Sequence[int]
+    ephemeris_crcs: Sequence[int]
+    corrections: Mapping[int, Items]
+    decorrelation: Mapping[int, Sequence[float]]
+    availability_s: Sequence[float | None]
+
+    @classmethod
+    def of(cls, sources: Sequence[SourceCorrection]) -> Sources:
+        """Columns of single sources.
+
+        Raises
+        ------
+        ScheduleError
+            When a source has no correction of its own for message type 1, or for one that another has.
+        """
+        first = [source.type1 for source in sources]
+        kinds = sorted({kind for source in sources for kind in source.corrections})
+        for kind in kinds:
+            for source in sources:
+                correction = source.corrections.get(kind)
+                if correction is None or correction.ranging_source_id != source.number:
+                    raise ScheduleError(_no_correction(source.number, kind))
+        return cls(
+            numbers=[each.ranging_source_id for each in first],
+            iods=[each.iod for each in first],
+            ephemeris_crcs=[source.ephemeris_crc for source in sources],
+            corrections={
+                kind: Items.of(tables.CORRECTION_ENTRIES[kind], [source.corrections[kind] for source in sources])
+                for kind in kinds
+            },
+            decorrelation={kind: [source.decorrelation.get(kind, math.nan) for source in sources] for kind in kinds},
+            availability_s=[source.source_availability_s for source in sources],
+        )
+
+
+def _no_correction(number: int, kind: int) -> str:
+    return f"ranging source {number} has no correction of its own for message type {kind}"
+
+
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Frame:
     """What a station has to say in one frame; the epoch of the corrections is the start of the frame."""
 
     gps_week: int
     tow_s: float
-    sources: tuple[SourceCorrection, ...]
+    sources: Sources
     station: Type2
     approaches: tuple[FasDataSet | UnknownDataSet, ...] = ()
     predictions: Type5 | None = None
@@ -247,59 +301,56 @@ def _names(slots: Sequence[int]) -> str:
 def _correction_messages(
     state: ScheduleState, frame: Frame, params: ScheduleParams
 ) -> tuple[list[Type1 | Type11], dict[int, SourceHistory]]:
-    by_source = {source.number: source for source in frame.sources}
-    if len(by_source) != len(frame.sources):
+    sources = frame.sources
+    row_of = {number: row for row, number in enumerate(sources.numbers)}
+    if len(row_of) != len(sources.numbers):
         raise ScheduleError("a ranging source is there twice")
-    if len(by_source) > _MAX_SOURCES:
-        raise ScheduleError(f"{len(by_source)} ranging sources; a linked pair of messages holds {_MAX_SOURCES}")
-    places = _places(len(by_source))
-    keys = {number: (source.type1.iod, source.ephemeris_crc) for number, source in by_source.items()}
+    if len(row_of) > _MAX_SOURCES:
+        raise ScheduleError(f"{len(row_of)} ranging sources; a linked pair of messages holds {_MAX_SOURCES}")
+    for kind in params.message_types:
+        if kind not in sources.corrections and row_of:
+            raise ScheduleError(_no_correction(sources.numbers[0], kind))
+    places = _places(len(row_of))
+    keys = dict(zip(sources.numbers, zip(sources.iods, sources.ephemeris_crcs, strict=True), strict=True))
     first, history = choose_first(state.sources, keys, state.frame, places)
-    rest = [number for number in sorted(by_source) if number not in first]
-    sizes = _group_sizes(len(by_source), params.message_types, params.slots)
+    rest = [number for number in sorted(row_of) if number not in first]
+    sizes = _group_sizes(len(row_of), params.message_types, params.slots)
     z_count_s = modified_z_count_s(frame.tow_s)
-    groups: list[tuple[int, tuple[SourceCorrection, ...]]] = []
+    groups: list[tuple[int, list[int]]] = []
     for place, size in enumerate(sizes):
         order = [*first[place : place + 1], *rest[: max(size - 1, 0)]]
         del rest[: max(size - 1, 0)]
-        flag = 0 if places == 1 else (1, 3)[place]
-        groups.append((flag, tuple(by_source[number] for number in order)))
-    messages = [_MESSAGES[kind](group, z_count_s, flag) for kind in params.message_types for flag, group in groups]
-    return messages, history
+        groups.append((0 if places == 1 else (1, 3)[place], [row_of[number] for number in order]))
+    return [
+        _MESSAGES[kind](sources, rows, z_count_s, flag) for kind in params.message_types for flag, rows in groups
+    ], history
 
 
-def _type1(group: Sequence[SourceCorrection], z_count_s: float, flag: int) -> Type1:
-    if not group:
+def _type1(sources: Sources, rows: list[int], z_count_s: float, flag: int) -> Type1:
+    if not rows:
         return Type1(modified_z_count_s=z_count_s, additional_message_flag=flag)
     return Type1(
         modified_z_count_s=z_count_s,
         additional_message_flag=flag,
-        ephemeris_decorrelation=group[0].decorrelation.get(1, math.nan),
-        ephemeris_crc=group[0].ephemeris_crc,
-        source_availability_s=group[0].source_availability_s,
-        measurements=tuple(source.type1 for source in group),
+        ephemeris_decorrelation=sources.decorrelation[1][rows[0]],
+        ephemeris_crc=sources.ephemeris_crcs[rows[0]],
+        source_availability_s=sources.availability_s[rows[0]],
+        measurements=cast("tuple[Correction100, ...]", sources.corrections[1].take(rows)),
     )
 
 
-def _type11(group: Sequence[SourceCorrection], z_count_s: float, flag: int) -> Type11:
-    measurements = []
-    for source in group:
-        correction = source.corrections.get(11)
-        if not isinstance(correction, Correction30) or correction.ranging_source_id != source.number:
-            raise ScheduleError(f"ranging source {source.number} has no correction of its own for message type 11")
-        measurements.append(correction)
+def _type11(sources: Sources, rows: list[int], z_count_s: float, flag: int) -> Type11:
+    if not rows:
+        return Type11(modified_z_count_s=z_count_s, additional_message_flag=flag)
     return Type11(
         modified_z_count_s=z_count_s,
         additional_message_flag=flag,
-        ephemeris_decorrelation_d=group[0].decorrelation.get(11, math.nan) if group else math.nan,
-        measurements=tuple(measurements),
+        ephemeris_decorrelation_d=sources.decorrelation[11][rows[0]],
+        measurements=cast("tuple[Correction30, ...]", sources.corrections[11].take(rows)),
     )
 
 
-_MESSAGES: Final[dict[int, Callable[[Sequence[SourceCorrection], float, int], Type1 | Type11]]] = {
-    1: _type1,
-    11: _type11,
-}
+_MESSAGES: Final[dict[int, Callable[[Sources, list[int], float, int], Type1 | Type11]]] = {1: _type1, 11: _type11}
 
 
 def _place_corrections(slots: Sequence[_Slot], blocks: Sequence[bytes]) -> None:
@@ -416,7 +467,7 @@ def _filler(used: int, params: ScheduleParams) -> list[bytes]:
 def sources_that_fit(station: Type2, approaches: Sequence[FasDataSet | UnknownDataSet], params: ScheduleParams) -> int:
     """How many ranging sources a station can broadcast with its slots, and still send everything else in its turn."""
     items = _periodic_items(
-        Frame(gps_week=0, tow_s=0.0, sources=(), station=station, approaches=tuple(approaches)), params
+        Frame(gps_week=0, tow_s=0.0, sources=Sources.of(()), station=station, approaches=tuple(approaches)), params
     )
     for n_sources in range(_MAX_SOURCES, -1, -1):
         sizes = _group_sizes(n_sources, params.message_types, params.slots)

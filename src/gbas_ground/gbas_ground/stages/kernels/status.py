@@ -62,7 +62,9 @@ class Satellites(NamedTuple):
         Those that every required monitor of signals could judge.
     cause : (N,) int array
         Of exclusions, clear for `clear_s`.
-    clear_s, elevation_rad, ephemeris_crc, count : (N,) arrays
+    clear_s, elevation_rad, ephemeris_crc : (N,) arrays
+    receivers : (N,) array
+        How many are behind each correction.
     prc_m, rrc_mps : (tau, N) arrays
     sigmas_m : (3, N) array
     """
@@ -72,7 +74,7 @@ class Satellites(NamedTuple):
     clear_s: FloatArray
     elevation_rad: FloatArray
     ephemeris_crc: FloatArray
-    count: FloatArray
+    receivers: FloatArray
     prc_m: FloatArray
     rrc_mps: FloatArray
     sigmas_m: FloatArray
@@ -89,7 +91,7 @@ def satellite_states(
     channels: Channels, satellites: Satellites, min_receivers: int, mask_rad: float
 ) -> tuple[FloatArray, FloatArray]:
     """State and cause of every satellite, each ``(N,)``."""
-    n_sats = len(satellites.count)
+    n_sats = len(satellites.receivers)
     state, cause = np.empty(n_sats), np.empty(n_sats)
     for i in range(n_sats):
         state[i], cause[i] = satellite_state(channels, satellites, i, min_receivers, mask_rad)
@@ -113,7 +115,7 @@ def satellite_state(
             elif math.isfinite(channels.age_s[m, i]):
                 settling += 1
     visible = satellites.elevation_rad[i] >= mask_rad
-    short = satellites.count[i] < min_receivers
+    short = satellites.receivers[i] < min_receivers
     waiting = short and ready < min_receivers <= ready + settling
     if not seen:
         return _NOT_TRACKED, _CAUSE_NOT_TRACKED if visible else _CAUSE_NONE
@@ -169,7 +171,7 @@ def channel_state(channels: Channels, m: int, i: int, state: float, cause: float
 def time_in_state(state: float, cause: float, before: FloatArray, elapsed_s: float) -> float:
     """Time in a state with a cause; `before` are those of the epoch before and their time [s]."""
     if state == before[0] and cause == before[1] and not math.isnan(before[2]):
-        return before[2] + elapsed_s
+        return float(before[2]) + elapsed_s
     return 0.0
 
 
@@ -221,42 +223,3 @@ def used_of_usable(used: BoolArray, state: FloatArray) -> tuple[BoolArray, BoolA
             channels[m, i] = used[m, i] and state[i] == USABLE
             receivers[m] = receivers[m] or channels[m, i]
     return channels, receivers
-
-
-@compiled
-def on_axis(values: FloatArray, state: FloatArray, n_rows: int) -> FloatArray:
-    """Values ``(m, N)`` of usable satellites, with room for more ``(n_rows, N)``."""
-    result = np.full((n_rows, len(state)), np.nan)
-    for row in range(len(values)):
-        for i in range(len(state)):
-            if state[i] == USABLE:
-                result[row, i] = values[row, i]
-    return result
-
-
-@compiled
-def by_receiver(
-    b_m: FloatArray, used: BoolArray, state: FloatArray, cause: FloatArray, n_products: int, n_rows: int
-) -> tuple[FloatArray, FloatArray]:
-    """B values ``(tau, R, N)`` of usable satellites, and 1 where a channel is used, each ``(n_products, n_rows, N)``."""
-    values = np.full((n_products, n_rows, len(state)), np.nan)
-    flags = np.full((n_products, n_rows, len(state)), np.nan)
-    for t in range(b_m.shape[0]):
-        for m in range(b_m.shape[1]):
-            for i in range(len(state)):
-                if state[i] == USABLE:
-                    values[t, m, i] = b_m[t, m, i]
-                if has_row(state[i], cause[i]):
-                    flags[t, m, i] = 1.0 if used[m, i] else 0.0
-    return values, flags
-
-
-@compiled
-def where_row(values: FloatArray, state: FloatArray, cause: FloatArray) -> FloatArray:
-    """Values ``(m, N)`` of satellites of which there is anything to say."""
-    result = np.full(values.shape, np.nan)
-    for row in range(len(values)):
-        for i in range(len(state)):
-            if has_row(state[i], cause[i]):
-                result[row, i] = values[row, i]
-    return result
