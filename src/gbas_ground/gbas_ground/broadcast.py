@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -30,6 +31,7 @@ from gbas_msgs_py.products import PRODUCTS
 from gbas_msgs_py.records import MAX_REFERENCE_RECEIVERS, IntegrityEpoch
 from gbas_vdb.messages.fields import Items
 from gbas_vdb.messages.tables import CORRECTION_ENTRIES
+from gbas_vdb.messages.types import Type2
 from gbas_vdb.transmission.burst import FRAME_DURATION_S, Burst
 from gbas_vdb.transmission.schedule import (
     Frame,
@@ -149,11 +151,16 @@ def broadcast_frame(
         gps_week=integrity.gps_week,
         tow_s=integrity.tow_s,
         sources=_sources(integrity, satellites, settings.schedule.message_types),
-        station=replace(settings.station, gcid=gcid, sigma_vert_iono_gradient=sigma_vig),
+        station=_station_data(settings.station, gcid, sigma_vig),
         approaches=settings.approaches,
     )
     scheduled, bursts = schedule_frame(state.schedule, frame, settings.schedule)
     return BroadcastState(schedule=scheduled, order=order), bursts
+
+
+@lru_cache(maxsize=64)
+def _station_data(station: Type2, gcid: int, sigma_vig: float) -> Type2:
+    return replace(station, gcid=gcid, sigma_vert_iono_gradient=sigma_vig)
 
 
 def highest_sent(usable: BoolArray, elevation_rad: FloatArray, room: int) -> BoolArray:

@@ -438,15 +438,15 @@ class FixedPlaces:
         self.places = _places(self._numbers, begins, at // 8)
 
     def row_of(self, record: Any) -> list[Any]:
-        """The numbers of a record, in the order of the columns."""
+        """The numbers of a record, in the order of the columns; None where they are missing and that is the way."""
         row = []
         for entry in self._entries:
             value = getattr(record, entry.name)
             if isinstance(entry, Vector):
                 _check_length(entry, value)
-                row.extend(value)
+                row.extend([_number(entry.item, each) for each in value])
             else:
-                row.append(len(value) or None if entry.counts else value)
+                row.append(_number(entry, (len(value) or None) if entry.counts else value))
         return row
 
     def values(self, row: FloatArray) -> dict[str, Any]:
@@ -474,6 +474,13 @@ class FixedPlaces:
     def record(self, row: FloatArray) -> Any:
         """The record of ``(F,)`` numbers."""
         return self._record(**self.values(row))
+
+
+def _number(number: Number, value: Any) -> Any:
+    """A value of a record as a table has it; missing in the other's way is minus infinity, which nothing can send."""
+    if (value is None or value != value) and number.valid_if is None and type(value) is not type(number.missing_value):
+        return -math.inf
+    return value
 
 
 def _number_of(count: Count) -> Number:

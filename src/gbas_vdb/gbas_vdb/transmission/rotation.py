@@ -105,14 +105,20 @@ def choose_first(
 
 
 def _sent(known: SourceHistory, frame: int) -> SourceHistory:
-    return replace(known, due=frame + FRAMES_BETWEEN, sent=True, run_left=max(known.run_left - 1, 0))
+    return SourceHistory(
+        key=known.key,
+        due=frame + FRAMES_BETWEEN,
+        sent=True,
+        changed=known.changed,
+        run_left=max(known.run_left - 1, 0),
+    )
 
 
 def _next(history: Mapping[int, SourceHistory], chosen: Sequence[int], frame: int, places: int) -> tuple[int, bool]:
-    waiting = [source for source in history if source not in chosen]
-    if all(history[source].sent and not history[source].changed for source in waiting):
-        return min(waiting, key=lambda s: (history[s].due, s)), False
-    waiting.sort(key=lambda s: (history[s].due, s))
+    limits = [(known.due, source) for source, known in history.items() if source not in chosen]
+    if not any(known.changed or not known.sent for known in history.values()):
+        return min(limits)[1], False
+    waiting = [source for _, source in sorted(limits)]
     for source in waiting:
         if history[source].changed and _others_keep_limit(history, waiting, chosen, source, frame, places, 3):
             return source, True
