@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import string
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -132,7 +132,7 @@ def same(a: Any, b: Any, tolerance: float = 1e-9) -> bool:
     """Whether two records are equal; missing equals missing, floats to a billionth (a count is never that small)."""
     if a is None or b is None or isinstance(a, (str, bool, bytes)):
         return type(a) is type(b) and a == b
-    if isinstance(a, tuple):
+    if isinstance(a, Sequence):
         return len(a) == len(b) and all(same(x, y, tolerance) for x, y in zip(a, b, strict=True))
     if isinstance(a, int) and isinstance(b, int):
         return a == b

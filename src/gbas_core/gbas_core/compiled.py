@@ -25,7 +25,7 @@ _dispatchers: Final[list[Any]] = []
 
 def compiled(function: _Function) -> _Function:
     """The function compiled, once a machine. No ``fastmath``: the order of sums and the meaning of NaN stay."""
-    dispatcher = njit(error_model="numpy")(function)
+    dispatcher: Any = njit(error_model="numpy")(function)
     try:
         dispatcher._cache = _Kept(function, stamp_of(function))
     except (OSError, RuntimeError):  # numba's word for no folder that can be written
@@ -44,7 +44,7 @@ def load_ahead() -> int:
     return sum(each._cache.load_all(each) for each in _dispatchers if isinstance(each._cache, _Kept))
 
 
-class _Kept(FunctionCache):  # type: ignore[misc]
+class _Kept(FunctionCache):
     """A function's cache that is valid for what the function calls, too, and never ends a program."""
 
     def __init__(self, function: Callable[..., Any], stamp: bytes) -> None:

@@ -6,12 +6,15 @@ the air with an empty type 1 message and says that it is not healthy.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
 
+from gbas_core.compiled import compiled
 from gbas_core.gnss.epoch_order import Arrival, EpochOrder
 from gbas_core.gnss.gpstime import epoch_key
 from gbas_core.record import BoolArray, FloatArray
@@ -26,22 +29,26 @@ from gbas_ground.sections import GCID_UNHEALTHY, MAX_SIGMA_VIG
 from gbas_msgs_py.codes import ChannelState
 from gbas_msgs_py.products import PRODUCTS
 from gbas_msgs_py.records import MAX_REFERENCE_RECEIVERS, IntegrityEpoch
+from gbas_vdb.messages.fixed_places import Items
 from gbas_vdb.messages.tables import CORRECTION_ENTRIES
-from gbas_vdb.messages.types import Correction30, Correction100
+from gbas_vdb.messages.types import Type2
 from gbas_vdb.transmission.burst import FRAME_DURATION_S, Burst
-from gbas_vdb.transmission.frame import Frame, ScheduleState, SourceCorrection
+from gbas_vdb.transmission.frame import Frame, ScheduleState, Sources
 from gbas_vdb.transmission.schedule import schedule_frame
 
 _FRAME_MS: Final = round(1000 * FRAME_DURATION_S)
 _IOD_MODULUS: Final = 256
+_SOURCE_ID: Final[FloatArray] = RANGING_SOURCE_ID.astype(np.float64)
 _WITH_B_VALUES: Final = frozenset(
     kind
     for kind, layout in CORRECTION_ENTRIES.items()
     if any(getattr(entry, "name", None) == "b_values_m" for entry in layout.entries)
 )
 """Types of messages that carry B values."""
-_MAX_CRC: Final = 0xFFFF
-_MAX_IOD: Final = np.where(IS_GALILEO, 1023, 255)  # Known: IODnav has 10 bits, IODE 8
+_HAS_B_VALUES: Final[BoolArray] = np.array([product.message_type in _WITH_B_VALUES for product in PRODUCTS])
+_USABLE: Final = float(ChannelState.USABLE)
+_MAX_CRC: Final = float(0xFFFF)
+_MAX_IOD: Final[FloatArray] = np.where(IS_GALILEO, 1023.0, 255.0)  # Known: IODnav has 10 bits, IODE 8
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -66,24 +73,50 @@ def empty_integrity(gps_week: int, tow_s: float) -> IntegrityEpoch:
 
 def broadcastable(integrity: IntegrityEpoch, params: GroundParams) -> BoolArray:
     """Satellites whose corrections are usable, complete and within what the messages can carry, ``(N,)``."""
-    ok = (integrity.state == ChannelState.USABLE) & _counts(integrity.iod) & _counts(integrity.ephemeris_crc)
-    ok = ok & (integrity.ephemeris_crc <= _MAX_CRC) & (integrity.iod <= _MAX_IOD)
-    # all that the station makes must be whole, whether a message carries it or not
-    for product in range(len(params.smoothing.tau_s)):
-        decorrelation, sigma = integrity.p_ephemeris[product], integrity.sigma_pr_gnd_m[product]
-        ok = ok & (decorrelation >= 0.0) & (decorrelation <= MAX_DECORRELATION)
-        ok = ok & (np.abs(integrity.prc_m[product]) <= params.correction_limits.max_prc_m)
-        ok = ok & (np.abs(integrity.rrc_mps[product]) <= params.correction_limits.max_rrc_mps)
-        ok = ok & (sigma > 0.0) & (sigma <= MAX_SIGMA_M)
-    ok = ok & (integrity.sigma_pr_gnd_d_m > 0.0) & (integrity.sigma_pr_gnd_d_m <= MAX_SIGMA_M)
-    b_m = integrity.b_m[[index for index, product in enumerate(PRODUCTS) if product.message_type in _WITH_B_VALUES]]
-    b = np.where(np.isnan(b_m), 0.0, np.abs(b_m)).max(axis=(0, 1))
-    return np.asarray(ok & (b <= MAX_B_VALUE_M))
+    return _carried(
+        integrity.state, integrity.iod, integrity.ephemeris_crc, integrity.sigma_pr_gnd_d_m, integrity.p_ephemeris,
+        integrity.prc_m, integrity.rrc_mps, integrity.sigma_pr_gnd_m, integrity.b_m, len(params.smoothing.tau_s),
+        float(params.correction_limits.max_prc_m), float(params.correction_limits.max_rrc_mps), _MAX_IOD,
+        _HAS_B_VALUES,
+    )  # fmt: skip
 
 
-def _counts(values: FloatArray) -> BoolArray:
-    """Where the values are whole numbers that are not negative."""
-    return np.asarray((values >= 0.0) & (values == np.floor(values)) & np.isfinite(values))
+@compiled
+def _carried(
+    state: FloatArray,
+    iod: FloatArray,
+    ephemeris_crc: FloatArray,
+    sigma_d_m: FloatArray,
+    decorrelation: FloatArray,
+    prc_m: FloatArray,
+    rrc_mps: FloatArray,
+    sigma_m: FloatArray,
+    b_m: FloatArray,
+    n_made: int,
+    max_prc_m: float,
+    max_rrc_mps: float,
+    max_iod: FloatArray,
+    has_b_values: BoolArray,
+) -> BoolArray:
+    """The same of the fields; all that the station makes must be whole, whether a message carries it or not."""
+    result = np.zeros(len(state), dtype=np.bool_)
+    for i in range(len(state)):
+        ok = state[i] == _USABLE and _is_count(iod[i], max_iod[i]) and _is_count(ephemeris_crc[i], _MAX_CRC)
+        ok = ok and 0.0 < sigma_d_m[i] <= MAX_SIGMA_M
+        for t in range(n_made):
+            ok = ok and 0.0 <= decorrelation[t, i] <= MAX_DECORRELATION and 0.0 < sigma_m[t, i] <= MAX_SIGMA_M
+            ok = ok and abs(prc_m[t, i]) <= max_prc_m and abs(rrc_mps[t, i]) <= max_rrc_mps
+        for t in range(len(b_m)):
+            for m in range(b_m.shape[1]):
+                ok = ok and not (has_b_values[t] and abs(b_m[t, m, i]) > MAX_B_VALUE_M)
+        result[i] = ok
+    return result
+
+
+@compiled
+def _is_count(value: float, largest: float) -> bool:
+    """Whether a value is a whole number from 0 to a largest."""
+    return 0.0 <= value <= largest and value == math.floor(value)
 
 
 def broadcast_frame(
@@ -113,12 +146,17 @@ def broadcast_frame(
     frame = Frame(
         gps_week=integrity.gps_week,
         tow_s=integrity.tow_s,
-        sources=_sources(integrity, satellites, params),
-        station=replace(settings.station, gcid=gcid, sigma_vert_iono_gradient=sigma_vig),
+        sources=_sources(integrity, satellites, settings.schedule.message_types),
+        station=_station_data(settings.station, gcid, sigma_vig),
         approaches=settings.approaches,
     )
     scheduled, bursts = schedule_frame(state.schedule, frame, settings.schedule)
     return BroadcastState(schedule=scheduled, order=order), bursts
+
+
+@lru_cache(maxsize=64)
+def _station_data(station: Type2, gcid: int, sigma_vig: float) -> Type2:
+    return replace(station, gcid=gcid, sigma_vert_iono_gradient=sigma_vig)
 
 
 def highest_sent(usable: BoolArray, elevation_rad: FloatArray, room: int) -> BoolArray:
@@ -137,60 +175,38 @@ def _highest(usable: BoolArray, elevation_rad: FloatArray, room: int) -> tuple[i
     return tuple(satellites.tolist())
 
 
-def _sources(
-    integrity: IntegrityEpoch, satellites: tuple[int, ...], params: GroundParams
-) -> tuple[SourceCorrection, ...]:
+def _sources(integrity: IntegrityEpoch, satellites: tuple[int, ...], types: tuple[int, ...]) -> Sources:
     """All there is to send of the satellites."""
-    chosen, types = list(satellites), params.schedule().message_types
-    sent = [(index, product) for index, product in enumerate(PRODUCTS) if product.message_type in types]
-    corrections = {
-        product.message_type: _ENTRIES[product.message_type](integrity, index, chosen) for index, product in sent
-    }
-    decorrelation = {product.message_type: integrity.p_ephemeris[index, chosen].tolist() for index, product in sent}
-    return tuple(
-        SourceCorrection(
-            corrections={kind: entries[place] for kind, entries in corrections.items()},
-            ephemeris_crc=int(crc),
-            decorrelation={kind: values[place] for kind, values in decorrelation.items()},
-        )
-        for place, crc in enumerate(integrity.ephemeris_crc[chosen].tolist())
+    chosen = np.array(satellites, dtype=np.int64)
+    sent = [(index, product.message_type) for index, product in enumerate(PRODUCTS) if product.message_type in types]
+    return Sources(
+        numbers=RANGING_SOURCE_ID[chosen].tolist(),
+        iods=(integrity.iod[chosen] % _IOD_MODULUS).astype(np.int64).tolist(),
+        ephemeris_crcs=integrity.ephemeris_crc[chosen].astype(np.int64).tolist(),
+        corrections={
+            kind: Items(CORRECTION_ENTRIES[kind], _COLUMNS[kind](integrity, index)[:, chosen].T.copy())
+            for index, kind in sent
+        },
+        decorrelation={kind: integrity.p_ephemeris[index, chosen].tolist() for index, kind in sent},
+        availability_s=(None,) * len(satellites),
     )
 
 
-def _entries_1(integrity: IntegrityEpoch, product: int, chosen: list[int]) -> list[Correction100]:
-    """Measurement blocks of a type 1 message."""
-    of_product = (integrity.prc_m, integrity.rrc_mps, integrity.sigma_pr_gnd_m)
-    columns = [values[product, chosen].tolist() for values in of_product]
-    b_values, iods = integrity.b_m[product][:, chosen].T.tolist(), integrity.iod[chosen].tolist()
-    return [
-        Correction100(
-            ranging_source_id=number,
-            iod=int(iod) % _IOD_MODULUS,
-            prc_m=prc,
-            rrc_mps=rrc,
-            sigma_pr_gnd_m=sigma,
-            b_values_m=tuple(b),
-        )
-        for number, iod, prc, rrc, sigma, b in zip(
-            RANGING_SOURCE_ID[chosen].tolist(), iods, *columns, b_values, strict=True
-        )
-    ]
+def _columns_1(integrity: IntegrityEpoch, product: int) -> FloatArray:
+    """Fields of the measurement blocks of a type 1 message, ``(F, N)``."""
+    return np.vstack([
+        _SOURCE_ID, integrity.iod % _IOD_MODULUS, integrity.prc_m[product], integrity.rrc_mps[product],
+        integrity.sigma_pr_gnd_m[product], integrity.b_m[product],
+    ])  # fmt: skip
 
 
-def _entries_11(integrity: IntegrityEpoch, product: int, chosen: list[int]) -> list[Correction30]:
-    """Measurement blocks of a type 11 message; the first sigma belongs to the type 1 correction."""
-    of_product = (integrity.prc_m[product], integrity.rrc_mps[product], integrity.sigma_pr_gnd_m[product])
-    columns = [values[chosen].tolist() for values in (*of_product, integrity.sigma_pr_gnd_d_m)]
-    return [
-        Correction30(
-            ranging_source_id=number, prc_30_m=prc, rrc_30_mps=rrc, sigma_pr_gnd_30_m=sigma, sigma_pr_gnd_d_m=sigma_d
-        )
-        for number, prc, rrc, sigma, sigma_d in zip(RANGING_SOURCE_ID[chosen].tolist(), *columns, strict=True)
-    ]
+def _columns_11(integrity: IntegrityEpoch, product: int) -> FloatArray:
+    """Fields of the measurement blocks of a type 11 message; the first sigma belongs to the type 1 correction."""
+    return np.vstack([
+        _SOURCE_ID, integrity.prc_m[product], integrity.rrc_mps[product], integrity.sigma_pr_gnd_d_m,
+        integrity.sigma_pr_gnd_m[product],
+    ])  # fmt: skip
 
 
-_ENTRIES: Final[dict[int, Callable[[IntegrityEpoch, int, list[int]], Sequence[Correction100 | Correction30]]]] = {
-    1: _entries_1,
-    11: _entries_11,
-}
-"""What each type of message takes of a product."""
+_COLUMNS: Final[dict[int, Callable[[IntegrityEpoch, int], FloatArray]]] = {1: _columns_1, 11: _columns_11}
+"""What each type of message takes of a product, in the order of its layout."""

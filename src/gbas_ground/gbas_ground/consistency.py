@@ -78,7 +78,8 @@ def no_exclusions(params: GroundParams) -> Exclusions:
     )
 
 
-class Corrections(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Corrections:
     """Corrections of one epoch; a satellite that is excluded has them too, for its own monitoring.
 
     Attributes
@@ -140,7 +141,8 @@ class Checks(NamedTuple):
 
     def summaries(self) -> Summaries:
         """What they say of each satellite."""
-        return {key: MonitorSummary(*(each[row] for each in self[:4]), Signal.L1) for row, key in enumerate(_TESTS)}
+        rows = zip(_TESTS, self.statistic, self.threshold, self.failed, self.due, strict=True)
+        return {key: MonitorSummary(value, limit, failed, due, Signal.L1) for key, value, limit, failed, due in rows}
 
 
 def form_corrections(

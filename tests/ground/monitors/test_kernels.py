@@ -136,6 +136,14 @@ def test_an_empty_sky_and_one_receiver(receivers, satellites):
         assert np.isnan(moved.satellites.statistic).all()
         assert np.isnan(seen.verdict.statistic).all()
         assert not seen.monitored.any()
-        for result in (moved.satellites, one.satellites, both.paper, both.full_rank, away, low.satellites, seen.verdict):
+        for result in (
+            moved.satellites,
+            one.satellites,
+            both.published,
+            both.full_rank,
+            away,
+            low.satellites,
+            seen.verdict,
+        ):
             assert not result.failed.any()
         assert not low.channels.failed.any()

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from gbas_vdb.errors import FieldError, ScheduleError
 from gbas_vdb.messages import types as m
 from gbas_vdb.transmission.burst import Burst
-from gbas_vdb.transmission.frame import Frame, ScheduleParams, ScheduleState, SourceCorrection
+from gbas_vdb.transmission.frame import Frame, ScheduleParams, ScheduleState, SourceCorrection, Sources
 from gbas_vdb.transmission.receive import DecodedBurst, decode_burst
 from gbas_vdb.transmission.rotation import FRAMES_AFTER_CHANGE, FRAMES_BETWEEN, choose_first
 from gbas_vdb.transmission.schedule import schedule_frame, sources_that_fit
@@ -89,7 +89,7 @@ def frames(
         frame = Frame(
             gps_week=2300,
             tow_s=100.0 + 0.5 * number,
-            sources=tuple(sources(number)),
+            sources=Sources.of(sources(number)),
             station=station(number),
             approaches=tuple(approaches),
             predictions=predictions,

@@ -180,10 +180,16 @@ def claimed_decorrelation(supported: FloatArray, least: float, external: bool = 
     """
     claimed = np.empty(len(supported))
     for i in range(len(supported)):
-        wanted = least if external or supported[i] < least else supported[i]
-        bounded = wanted if wanted <= MAX_DECORRELATION else MAX_DECORRELATION
-        claimed[i] = math.ceil(bounded / DECORRELATION_STEP - 1e-6) * DECORRELATION_STEP
+        claimed[i] = claimed_decorrelation_of(supported[i], least, external)
     return claimed
+
+
+@compiled
+def claimed_decorrelation_of(supported: float, least: float, external: bool) -> float:
+    """:func:`claimed_decorrelation` of one satellite."""
+    wanted = least if external or supported < least else supported
+    bounded = wanted if wanted <= MAX_DECORRELATION else MAX_DECORRELATION
+    return math.ceil(bounded / DECORRELATION_STEP - 1e-6) * DECORRELATION_STEP
 
 
 def refuse_smaller(key: str, value: float, site: OrbitSite, mask_rad: float, *, excludes: bool) -> None:

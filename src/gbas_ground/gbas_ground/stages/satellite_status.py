@@ -52,7 +52,7 @@ def satellite_status(corrected: Corrected, channels: Channels, station: Prepared
         clear_s=latch.clear_s,
         elevation_rad=inputs.elevation_rad,
         ephemeris_crc=corrected.monitored.tracked.received.known.crc,
-        count=corrections.count,
+        receivers=corrections.count,
         prc_m=corrections.prc_m,
         rrc_mps=corrections.rrc_mps,
         sigmas_m=corrections.sigmas_m,

@@ -61,6 +61,11 @@ class BitReader:
         return (self.value >> start) & ((1 << bits) - 1)
 
 
+def byte_array(data: bytes) -> BitArray:
+    """(n,) bytes, read-only: the one kind of array that compiled loops are given."""
+    return np.frombuffer(bytes(data), dtype=np.uint8)
+
+
 def bits_lsb_first(data: bytes) -> BitArray:
     """(8 n,) bits of data bytes in the order of the air: each byte least significant bit first."""
     return np.unpackbits(np.frombuffer(data, dtype=np.uint8), bitorder="little")

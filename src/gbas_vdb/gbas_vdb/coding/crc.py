@@ -10,11 +10,13 @@ Source: Annex 10 Volume I, Appendix B, 3.6.3.3.3 (CRC-32Q) and 3.6.3.2.2.3 (ephe
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+
+from gbas_vdb.coding.bits import byte_array
+from gbas_vdb.coding.kernels.registers import reflected_remainder
 
 # x^32 + x^31 + x^24 + x^22 + x^16 + x^14 + x^8 + x^7 + x^5 + x^3 + x + 1 without its highest term.
 CRC32_POLYNOMIAL: Final = 0x814141AB
@@ -22,7 +24,7 @@ CRC32_POLYNOMIAL: Final = 0x814141AB
 CRC16_POLYNOMIAL: Final = 0x1021
 
 
-def _reflected_table(polynomial: int, width: int) -> tuple[int, ...]:
+def _reflected_table(polynomial: int, width: int) -> NDArray[np.uint32]:
     reflected = int(f"{polynomial:0{width}b}"[::-1], 2)
     table = []
     for byte in range(256):
@@ -30,7 +32,7 @@ def _reflected_table(polynomial: int, width: int) -> tuple[int, ...]:
         for _ in range(8):
             register = (register >> 1) ^ (reflected if register & 1 else 0)
         table.append(register)
-    return tuple(table)
+    return np.array(table, dtype=np.uint32)
 
 
 _TABLE_32: Final = _reflected_table(CRC32_POLYNOMIAL, 32)
@@ -39,35 +41,9 @@ _TABLE_16: Final = _reflected_table(CRC16_POLYNOMIAL, 16)
 
 def crc32q(data: bytes) -> int:
     """CRC of a message block or FAS block: the 32-bit field, first transmitted bit least significant."""
-    if len(data) > _TABULATED_BYTES:
-        return _bytewise(data, _TABLE_32)
-    # The register begins at zero, so the check is linear: every byte adds what it leaves from its place to the end.
-    followed_by = _FROM_END[_TABULATED_BYTES - len(data) :]
-    return int(np.bitwise_xor.reduce(_contributions()[followed_by, np.frombuffer(data, dtype=np.uint8)]))
+    return reflected_remainder(byte_array(data), _TABLE_32)
 
 
 def crc16(data: bytes) -> int:
     """Ephemeris CRC over bytes fed least significant bit first: the 16-bit field of the type 1 message."""
-    return _bytewise(data, _TABLE_16)
-
-
-def _bytewise(data: bytes, table: tuple[int, ...]) -> int:
-    register = 0
-    for byte in data:
-        register = table[(register ^ byte) & 0xFF] ^ (register >> 8)
-    return register
-
-
-# As much as the application data of a burst; what is longer is none of the VDB's.
-_TABULATED_BYTES: Final = 222
-_FROM_END: Final = np.arange(_TABULATED_BYTES)[::-1]
-
-
-@cache
-def _contributions() -> NDArray[np.uint32]:
-    """(222, 256) registers that each byte value leaves at the end, by how many bytes follow it."""
-    table = np.array(_TABLE_32, dtype=np.uint32)
-    rows = [table]
-    for _ in range(_TABULATED_BYTES - 1):
-        rows.append(table[rows[-1] & 0xFF] ^ (rows[-1] >> np.uint32(8)))
-    return np.array(rows)
+    return reflected_remainder(byte_array(data), _TABLE_16)

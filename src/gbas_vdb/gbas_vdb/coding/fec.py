@@ -12,10 +12,11 @@ import numpy as np
 import reedsolo
 from numpy.typing import NDArray
 
-from gbas_vdb.coding.bits import BitArray
+from gbas_vdb.coding.bits import BitArray, byte_array
+from gbas_vdb.coding.kernels.registers import FEC_BYTES as FEC_BYTES
+from gbas_vdb.coding.kernels.registers import code_remainder
 from gbas_vdb.errors import FecError, VdbError
 
-FEC_BYTES: Final = 6
 MAX_APPLICATION_BYTES: Final = 222
 _CODE_BYTES: Final = 255
 _DATA_BYTES: Final = _CODE_BYTES - FEC_BYTES
@@ -38,17 +39,9 @@ def encode_fec(application_data: bytes) -> bytes:
         For more than 222 bytes.
     """
     _check_length(len(application_data))
-    packed = np.bitwise_xor.reduce(_parity_table()[np.arange(len(application_data)), _as_array(application_data)])
-    return int(packed).to_bytes(8, "little")[:FEC_BYTES]
-
-
-def syndromes(payload: bytes) -> int:
-    """The six syndromes of application data and FEC, packed in an integer; zero when there is no error.
-
-    The code is linear: the contribution of each byte at each place is tabulated, and the sum is an exclusive or. This
-    costs microseconds where the general decoder takes milliseconds, and nearly all bursts have no error.
-    """
-    return int(np.bitwise_xor.reduce(_syndrome_table()[_places(len(payload)), _as_array(payload)]))
+    # what is not sent is zero and lies between data and FEC
+    zeros = _DATA_BYTES - len(application_data)
+    return code_remainder(byte_array(application_data), zeros, _generator_table()).to_bytes(FEC_BYTES, "little")
 
 
 def correct_fec(payload: bytes) -> tuple[bytes, int]:
@@ -74,7 +67,7 @@ def correct_fec(payload: bytes) -> tuple[bytes, int]:
     """
     n_data = len(payload) - FEC_BYTES
     _check_length(n_data)
-    if syndromes(payload) == 0:
+    if encode_fec(payload[:n_data]) == payload[n_data:]:  # nearly all bursts; the general decoder takes milliseconds
         return payload[:n_data], 0
     fill = bytes(_DATA_BYTES - n_data)
     codeword = payload[:n_data] + fill + payload[n_data:][::-1]
@@ -92,69 +85,34 @@ def _check_length(n_data: int) -> None:
         raise VdbError(f"application data of {n_data} bytes outside 0 to {MAX_APPLICATION_BYTES}")
 
 
-def _as_array(data: bytes) -> NDArray[np.uint8]:
-    return np.frombuffer(data, dtype=np.uint8)
-
-
 @cache
-def _places(n_payload: int) -> NDArray[np.intp]:
-    """Degree in the code polynomial of each payload byte: data from the highest down, then FEC b0 first."""
-    n_data = n_payload - FEC_BYTES
-    return np.concatenate([_CODE_BYTES - 1 - np.arange(n_data), np.arange(FEC_BYTES)])
+def _generator_table() -> NDArray[np.uint64]:
+    """(256,) generator polynomial without its highest term times every byte, the highest power in the highest byte."""
+    generator = [1]
+    for exponent in range(FEC_BYTES):
+        root = _power(_FIRST_ROOT + exponent)
+        shifted, scaled = [*generator, 0], [0, *(_product(root, each) for each in generator)]
+        generator = [one ^ other for one, other in zip(shifted, scaled, strict=True)]
+    rows = [bytes(_product(byte, each) for each in generator[1:]) for byte in range(256)]
+    return np.array([int.from_bytes(row, "big") for row in rows], dtype=np.uint64)
 
 
-@cache
-def _powers() -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Powers of alpha by exponent (twice round), and exponents by power (that of zero is not meant to be used)."""
-    exponential = np.zeros(2 * 255, dtype=np.int64)
-    logarithm = np.zeros(256, dtype=np.int64)
-    value = 1
-    for exponent in range(255):
-        exponential[exponent] = exponential[exponent + 255] = value
-        logarithm[value] = exponent
-        value <<= 1
-        if value & 0x100:
-            value ^= _FIELD_POLYNOMIAL
-    return exponential, logarithm
+def _product(one: int, other: int) -> int:
+    """Product of two elements of the field."""
+    result = 0
+    while other:
+        if other & 1:
+            result ^= one
+        one <<= 1
+        if one & 0x100:
+            one ^= _FIELD_POLYNOMIAL
+        other >>= 1
+    return result
 
 
-def _times_all_bytes(factors: NDArray[np.int64]) -> NDArray[np.int64]:
-    """(..., 256) products of field elements with every byte value."""
-    exponential, logarithm = _powers()
-    values = np.arange(256)
-    products = exponential[(logarithm[factors][..., None] + logarithm[values]) % 255]
-    return np.where((factors[..., None] == 0) | (values == 0), 0, products)
-
-
-def _packed(parts: NDArray[np.int64]) -> NDArray[np.uint64]:
-    """(n, 256) integers of (n, 6, 256) bytes, the first in the lowest eight bits."""
-    shifts = np.uint64(8) * np.arange(FEC_BYTES, dtype=np.uint64)
-    packed: NDArray[np.uint64] = np.bitwise_or.reduce(parts.astype(np.uint64) << shifts[:, None], axis=1)
-    return packed
-
-
-@cache
-def _syndrome_table() -> NDArray[np.uint64]:
-    """(255, 256) packed syndromes of each byte value at each degree."""
-    exponential, _ = _powers()
-    degrees = np.arange(_CODE_BYTES)[:, None]
-    roots = _FIRST_ROOT + np.arange(FEC_BYTES)
-    return _packed(_times_all_bytes(exponential[(roots * degrees) % 255]))
-
-
-@cache
-def _parity_table() -> NDArray[np.uint64]:
-    """(222, 256) packed FEC bytes of each byte value at each place of the application data.
-
-    The generator matrix of the code, multiplied out: reedsolo's encoder is a Python loop over 249 times 6 products and
-    costs several hundred microseconds a burst on a small machine, this costs about 5. Rows come from reedsolo itself.
-    """
-    rows = np.zeros((MAX_APPLICATION_BYTES, FEC_BYTES), dtype=np.int64)
-    for place in range(MAX_APPLICATION_BYTES):
-        unit = bytearray(_DATA_BYTES)
-        unit[place] = 1
-        rows[place] = list(_codec().encode(unit)[: _DATA_BYTES - 1 : -1])
-    return _packed(_times_all_bytes(rows))
+def _power(exponent: int) -> int:
+    """Power of alpha."""
+    return 1 if exponent == 0 else _product(2, _power(exponent - 1))
 
 
 # One row a parity bit, over SSID and transmission length in the order of the air.

@@ -6,6 +6,7 @@ Source: Annex 10 Volume I, Appendix B, 3.6.3.4.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Final
 
 from gbas_vdb.coding.bits import BitReader, BitWriter
@@ -109,13 +110,18 @@ def wrap_body(message_type: int, body: bytes, station_id: str, *, test: bool = F
     length = HEADER_BYTES + len(body) + CRC_BYTES
     if length > MAX_BLOCK_BYTES:
         raise FieldError(f"message type {message_type} of {length} bytes; at most {MAX_BLOCK_BYTES} fit")
+    data = _header(message_type, length, station_id, test) + body
+    return data + crc32q(data).to_bytes(CRC_BYTES, "little")
+
+
+@lru_cache(maxsize=1024)
+def _header(message_type: int, length: int, station_id: str, test: bool) -> bytes:
     header = BitWriter()
     header.put(MBI_TEST if test else MBI_NORMAL, 8)
     header.put(tables.STATION_ID.to_raw(station_id), tables.STATION_ID.bits)
     header.put(tables.MESSAGE_TYPE.to_raw(message_type), tables.MESSAGE_TYPE.bits)
     header.put(length, 8)
-    data = header.to_bytes() + body
-    return data + crc32q(data).to_bytes(CRC_BYTES, "little")
+    return header.to_bytes()
 
 
 def encode_body(message: m.Message) -> bytes:
@@ -184,8 +190,7 @@ def decode_block(data: bytes) -> MessageBlock:
             f"message CRC failed: received {received:#010x}, computed {computed:#010x} "
             f"(message type {data[4]}, {length} bytes)"
         )
-    header = BitReader(data[1:4])
-    station_id = tables.STATION_ID.from_raw(header.take(24))
+    station_id = _station_id(data[1:4])
     try:
         message, notes = decode_body(data[4], data[HEADER_BYTES:-CRC_BYTES])
     except VdbError as error:
@@ -198,6 +203,11 @@ def decode_block(data: bytes) -> MessageBlock:
         message=message,
         notes=notes,
     )
+
+
+@lru_cache(maxsize=256)
+def _station_id(data: bytes) -> str:
+    return tables.STATION_ID.from_raw(int.from_bytes(data, "little"))
 
 
 def _block_length(data: bytes) -> int:

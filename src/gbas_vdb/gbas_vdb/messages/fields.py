@@ -11,37 +11,22 @@ limits (alert limits, maximum distance, availability) round down, so that quanti
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 from operator import attrgetter
 from typing import Any, Final, Literal
 
+from gbas_core.compiled import as_written
 from gbas_vdb.errors import FieldError
-
-# A value that was computed from counts (0.02 * 3) must round up to the same counts: this part of one count is allowed.
-_ROUNDING_SLACK: Final = 1e-6
-
-# Nothing on the VDB is larger than this; beyond it arithmetic could overflow before the bounds are looked at.
-_LARGEST: Final = 1e15
-
-# Fields up to this long are decoded by a table.
-_TABULATED_BITS: Final = 8
-_REFUSED: Final = object()
+from gbas_vdb.messages.kernels.numbers import DOWN, LARGEST, NEAREST, UP, counts_of, quantity_of
 
 Rounding = Literal["nearest", "up", "down"]
 
 
-def _rounded_up(counts: float) -> int:
-    return math.ceil(counts - _ROUNDING_SLACK)
-
-
-def _rounded_down(counts: float) -> int:
-    return math.floor(counts + _ROUNDING_SLACK)
-
-
-_ROUNDED: Final[dict[Rounding, Callable[[float], int]]] = {"nearest": round, "up": _rounded_up, "down": _rounded_down}
+ROUNDINGS: Final[dict[Rounding, int]] = {"nearest": NEAREST, "up": UP, "down": DOWN}
+_counts_of, _quantity_of = as_written(counts_of), as_written(quantity_of)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,6 +52,8 @@ class Number:
     rounding
     valid_if : str or None
         Name of another entry: when that one is missing (or an empty group), this one is missing too, and sent as zero.
+    counts : bool
+        It says how many items the group of its name has.
     """
 
     name: str
@@ -82,6 +69,7 @@ class Number:
     saturates: bool = False
     rounding: Rounding = "nearest"
     valid_if: str | None = None
+    counts: bool = False
 
     @cached_property
     def bounds(self) -> tuple[int, int]:
@@ -90,7 +78,8 @@ class Number:
         return (low if self.minimum is None else self.minimum, high if self.maximum is None else self.maximum)
 
     @cached_property
-    def _ratio(self) -> tuple[float, float]:
+    def ratio(self) -> tuple[float, float]:
+        """Value of one count, as numerator and denominator."""
         if isinstance(self.scale, Fraction):
             return float(self.scale.numerator), float(self.scale.denominator)
         return (1.0 if self.scale is None else float(self.scale)), 1.0
@@ -111,9 +100,7 @@ class Number:
         """Physical value of a raw count."""
         if self.scale is None:
             return raw + self.offset
-        # The offset is added before the division: one rounding, so that decimal values come out as they are written.
-        numerator, denominator = self._ratio
-        return (self.offset * denominator + raw * numerator) / denominator
+        return _quantity_of(raw, *self.ratio, self.offset)
 
     def to_raw(self, value: Any) -> int:
         """Raw count of a physical value.
@@ -125,16 +112,11 @@ class Number:
         """
         if value is None or value != value or value in (math.inf, -math.inf):
             return self._special(value)
-        if not -_LARGEST < value < _LARGEST:
+        if not -LARGEST < value < LARGEST:
             raise self._out_of_bounds(value)
-        numerator, denominator = self._ratio
-        counts = (value - self.offset) * denominator / numerator
-        if self.scale is None:
-            raw = int(value) - self.offset
-            if raw != counts:
-                raise FieldError(f"{self.name} = {value!r} is not an integer")
-        else:
-            raw = _ROUNDED[self.rounding](counts)
+        raw = _counts_of(value, *self.ratio, self.offset, ROUNDINGS[self.rounding])
+        if self.scale is None and raw + self.offset != value:
+            raise FieldError(f"{self.name} = {value!r} is not an integer")
         low, high = self.bounds
         if low <= raw <= high and raw not in self.codes:
             return raw
@@ -175,51 +157,15 @@ class Number:
             raise self._out_of_bounds(self.physical(raw))
         return self.physical(raw)
 
+    @cached_property
+    def missing_value(self) -> float | None:
+        """The same where there is a code for it, as the code has it."""
+        return next((value for value in self.codes.values() if is_missing(value)), self.missing)
+
     @property
     def missing(self) -> float | None:
         """What stands for a missing value: None for integers, NaN for quantities."""
         return None if self.scale is None else math.nan
-
-    @cached_property
-    def quick_raw(self) -> Callable[[Any], int | None]:
-        """:meth:`to_raw` for ordinary values; gives None for all others, which are to_raw's business."""
-        (low, high), offset, codes = self.bounds, self.offset, self.codes
-        numerator, denominator = self._ratio
-        roundings: dict[str, Callable[[float], int]] = {"nearest": round, "up": _rounded_up, "down": _rounded_down}
-        rounded = roundings[self.rounding]
-
-        def integer(value: Any) -> int | None:
-            if type(value) is not int:
-                return None
-            raw = value - offset
-            return raw if low <= raw <= high and raw not in codes else None
-
-        def quantity(value: Any) -> int | None:
-            if type(value) is not float or not -_LARGEST < value < _LARGEST:
-                return None
-            raw = rounded((value - offset) * denominator / numerator)
-            return raw if low <= raw <= high and raw not in codes else None
-
-        return integer if self.scale is None else quantity
-
-    @cached_property
-    def quick_value(self) -> Callable[[int], Any]:
-        """:meth:`from_raw`; of short fields all values are made once."""
-        if self.bits > _TABULATED_BITS:
-            return self.from_raw
-        values = [self._value_or_refused(raw) for raw in range(1 << self.bits)]
-
-        def tabulated(raw: int) -> Any:
-            value = values[raw]
-            return self.from_raw(raw) if value is _REFUSED else value
-
-        return tabulated
-
-    def _value_or_refused(self, raw: int) -> Any:
-        try:
-            return self.from_raw(raw)
-        except FieldError:
-            return _REFUSED
 
 
 @dataclass(frozen=True, kw_only=True)

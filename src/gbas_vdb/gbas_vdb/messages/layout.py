@@ -1,20 +1,24 @@
 """Layouts of records: entries in the order of transmission, and the interpreter between records and bits.
 
-:func:`encode` and :func:`decode` interpret the entries of a :class:`Layout`; records of a fixed length without groups
-have a quicker way to the same bits (:class:`FixedPlaces`).
+:func:`encode` and :func:`decode` interpret the entries of a :class:`Layout`; records of numbers at fixed places have a
+quicker way to the same bits (:mod:`gbas_vdb.messages.fixed_places`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from types import SimpleNamespace
 from typing import Any
 
-from gbas_vdb.coding.bits import BitReader, BitWriter
+import numpy as np
+
+from gbas_vdb.coding.bits import BitReader, BitWriter, byte_array
 from gbas_vdb.errors import FieldError, VdbError
 from gbas_vdb.messages.fields import Choice, Count, Letter, Number, Spare, Switch, Text, Vector, is_missing
+from gbas_vdb.messages.fixed_places import FixedPlaces, Items, check_length
+from gbas_vdb.messages.kernels.numbers import pack, unpack
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,10 +64,26 @@ class Layout:
         return tuple(entry for entry in self.entries if isinstance(entry, Switch))
 
     @cached_property
-    def fixed(self) -> FixedPlaces | None:
-        """The quick codec, where every field is a number at a fixed place; None elsewhere."""
-        simple = all(isinstance(entry, Number | Spare | Vector) for entry in self.entries)
-        return FixedPlaces(self) if simple else None
+    def leading(self) -> tuple[Entry, ...]:
+        """All entries, but for a group at the end."""
+        return self.entries[:-1] if isinstance(self.entries[-1], Group) else self.entries
+
+    @cached_property
+    def group(self) -> Group | None:
+        """A group of fixed items at the end."""
+        last = self.entries[-1]
+        return last if isinstance(last, Group) and last.layout.is_fixed and last.layout.group is None else None
+
+    @cached_property
+    def is_fixed(self) -> bool:
+        """Whether every field is a number at a fixed place, in whole bytes, but for such a group at the end."""
+        simple = all(isinstance(entry, Number | Spare | Vector | Count) for entry in self.leading)
+        return simple and self.bits % 8 == 0 and (self.leading == self.entries or self.group is not None)
+
+    @cached_property
+    def places(self) -> FixedPlaces:
+        """The codec of whole tables, where fields are fixed."""
+        return FixedPlaces(self)
 
 
 def _bits_of(entry: Entry) -> int:
@@ -80,63 +100,6 @@ def _bits_of(entry: Entry) -> int:
             return entry.bits
 
 
-class FixedPlaces:
-    """Codec of a layout of numbers whose places do not depend on the record: bits move as one integer.
-
-    Corrections are by far the most of what is sent, and all of this kind: this costs a third of going entry by entry.
-
-    Attributes
-    ----------
-    n_bits : int
-        Of the whole layout.
-    """
-
-    def __init__(self, layout: Layout) -> None:
-        self._record = layout.record
-        self._conditional = tuple((number.name, str(number.valid_if), number.missing) for number in layout.conditional)
-        self._numbers: list[tuple[Number, int, int]] = []
-        self._vectors: list[tuple[Vector, tuple[int, ...], int]] = []
-        at = 0
-        for entry in layout.entries:
-            if isinstance(entry, Vector):
-                places = tuple(at + index * entry.item.bits for index in range(entry.length))
-                self._vectors.append((entry, places, (1 << entry.item.bits) - 1))
-                at += entry.length * entry.item.bits
-            else:
-                assert isinstance(entry, Number | Spare)
-                if isinstance(entry, Number):
-                    self._numbers.append((entry, at, (1 << entry.bits) - 1))
-                at += entry.bits
-        self.n_bits = at
-
-    def encode(self, record: Any) -> int:
-        """The record's bits; raises FieldError as :func:`encode` does."""
-        bits = 0
-        for entry, place, mask in self._numbers:
-            raw = entry.quick_raw(getattr(record, entry.name))
-            if raw is None:
-                raw = _number_to_raw(entry, record)
-            bits |= (raw & mask) << place
-        for vector, places, mask in self._vectors:
-            values, item = getattr(record, vector.name), vector.item
-            _check_length(vector, values)
-            for value, place in zip(values, places, strict=True):
-                raw = item.quick_raw(value)
-                bits |= ((item.to_raw(value) if raw is None else raw) & mask) << place
-        return bits
-
-    def decode(self, bits: int) -> Any:
-        """The record of its bits; raises FieldError as :func:`decode` does."""
-        values = {entry.name: entry.quick_value(bits >> place & mask) for entry, place, mask in self._numbers}
-        for vector, places, mask in self._vectors:
-            value_of = vector.item.quick_value
-            values[vector.name] = tuple([value_of(bits >> place & mask) for place in places])
-        for name, valid_if, missing in self._conditional:
-            if is_missing(values[valid_if]):
-                values[name] = missing
-        return self._record(**values)
-
-
 def encode(layout: Layout, record: Any, writer: BitWriter) -> None:
     """Append a record's fields to `writer`.
 
@@ -145,7 +108,14 @@ def encode(layout: Layout, record: Any, writer: BitWriter) -> None:
     FieldError
         Naming the field, its value and the bound; group items are named with their position.
     """
-    for entry in layout.entries:
+    if layout.group is not None and layout.is_fixed:
+        row = np.array([layout.places.row_of(record)], dtype=np.float64)
+        data, refused = pack(row, layout.places.places)
+        if refused < 0:
+            writer.put(int.from_bytes(data.tobytes(), "little"), layout.bits)
+            _encode_group(layout.group, getattr(record, layout.group.name), writer)
+            return
+    for entry in layout.entries:  # or what cannot be sent is told here
         if isinstance(entry, Number):
             writer.put(_number_to_raw(entry, record), entry.bits)
         elif isinstance(entry, (Choice, Letter, Text)):
@@ -175,33 +145,26 @@ def _number_to_raw(entry: Number, record: Any) -> int:
     return entry.to_raw(value)
 
 
-def _check_length(entry: Vector, values: Any) -> None:
-    if len(values) != entry.length:
-        raise FieldError(f"{entry.name} has {len(values)} values, not {entry.length}")
-
-
 def _encode_vector(entry: Vector, values: Any, writer: BitWriter) -> None:
-    _check_length(entry, values)
+    check_length(entry, values)
     for value in values:
         writer.put(entry.item.to_raw(value), entry.item.bits)
 
 
 def _encode_group(entry: Group, items: Any, writer: BitWriter) -> None:
+    if isinstance(items, Items):
+        data, refused = pack(items.rows, entry.layout.places.places)
+        if refused < 0:
+            writer.put(int.from_bytes(data.tobytes(), "little"), 8 * len(data))
+            return
     # Each item is collected apart: shifting a short integer is cheaper than shifting the whole message.
     for position, item in enumerate(items):
+        part = BitWriter()
         try:
-            bits, n_bits = _item_bits(entry.layout, item)
+            encode(entry.layout, item, part)
         except FieldError as error:
             raise FieldError(f"{entry.name}[{position}]: {error}") from None
-        writer.put(bits, n_bits)
-
-
-def _item_bits(layout: Layout, item: Any) -> tuple[int, int]:
-    if layout.fixed is not None:
-        return layout.fixed.encode(item), layout.fixed.n_bits
-    part = BitWriter()
-    encode(layout, item, part)
-    return part.value, part.n_bits
+        writer.put(part.value, part.n_bits)
 
 
 def decode(layout: Layout, reader: BitReader) -> Any:
@@ -221,8 +184,20 @@ def decode(layout: Layout, reader: BitReader) -> Any:
 
 
 def _decode(layout: Layout, reader: BitReader) -> Any:
-    if layout.fixed is not None:
-        return layout.fixed.decode(reader.take(layout.fixed.n_bits))
+    if layout.group is not None and layout.is_fixed and reader.remaining >= layout.bits:
+        begin, n_bytes = reader.position, layout.bits // 8
+        rows, refused, _ = unpack(
+            byte_array(reader.take(layout.bits).to_bytes(n_bytes, "little")), layout.places.places
+        )
+        if refused < 0:
+            values = layout.places.values(rows[0])
+            values[layout.group.name] = _decoded_group(layout.group.layout, values[layout.group.name] or 0, reader)
+            return layout.record(**values)
+        reader.position = begin  # what is not allowed is told below
+    return _decode_entries(layout, reader)
+
+
+def _decode_entries(layout: Layout, reader: BitReader) -> Any:
     values: dict[str, Any] = {}
     counts: dict[str, int] = {}
     raw_of_switch: dict[int, int] = {}
@@ -237,7 +212,7 @@ def _decode(layout: Layout, reader: BitReader) -> Any:
         elif isinstance(entry, Count):
             counts[entry.of] = _checked_count(entry, reader.take(entry.bits))
         elif isinstance(entry, Group):
-            values[entry.name] = tuple([_decode(entry.layout, reader) for _ in range(counts[entry.name])])
+            values[entry.name] = _decoded_group(entry.layout, counts[entry.name], reader)
         elif isinstance(entry, Switch):
             raw_of_switch[id(entry)] = reader.take(entry.default.bits)
         else:
@@ -248,6 +223,13 @@ def _decode(layout: Layout, reader: BitReader) -> Any:
         if is_missing(values[str(number.valid_if)]):
             values[number.name] = number.missing
     return layout.record(**values)
+
+
+def _decoded_group(layout: Layout, count: int, reader: BitReader) -> Sequence[Any]:
+    if layout.is_fixed and count:
+        n_bytes = count * layout.bits // 8
+        return Items(layout, layout.places.unpack(reader.take(8 * n_bytes).to_bytes(n_bytes, "little")))
+    return tuple([_decode(layout, reader) for _ in range(count)])
 
 
 def _checked_count(entry: Count, count: int) -> int:

@@ -6,11 +6,14 @@ has sent before; :mod:`gbas_vdb.transmission.schedule` makes bursts of them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from gbas_vdb.errors import ScheduleError
 from gbas_vdb.messages import tables
+from gbas_vdb.messages.fixed_places import Items
 from gbas_vdb.messages.types import Correction30, Correction100, FasDataSet, Type2, Type5, UnknownDataSet
 from gbas_vdb.transmission.rotation import SourceHistory
 
@@ -108,13 +111,66 @@ class SourceCorrection:
         return self.type1.ranging_source_id
 
 
+class Sources(NamedTuple):
+    """All there is to broadcast of the ranging sources in a frame, as columns of one length.
+
+    Attributes
+    ----------
+    numbers, iods, ephemeris_crcs : list of int
+    corrections : mapping of int to Items
+        By the type of the message that carries them.
+    decorrelation : mapping of int to list of float
+        P of each message [m/m].
+    availability_s : list of float or None
+    """
+
+    numbers: Sequence[int]
+    iods: Sequence[int]
+    ephemeris_crcs: Sequence[int]
+    corrections: Mapping[int, Items]
+    decorrelation: Mapping[int, Sequence[float]]
+    availability_s: Sequence[float | None]
+
+    @classmethod
+    def of(cls, sources: Sequence[SourceCorrection]) -> Sources:
+        """Columns of single sources.
+
+        Raises
+        ------
+        ScheduleError
+            When a source has no correction of its own for message type 1, or for one that another has.
+        """
+        first = [source.type1 for source in sources]
+        kinds = sorted({kind for source in sources for kind in source.corrections})
+        for kind in kinds:
+            for source in sources:
+                correction = source.corrections.get(kind)
+                if correction is None or correction.ranging_source_id != source.number:
+                    raise ScheduleError(no_correction(source.number, kind))
+        return cls(
+            numbers=[each.ranging_source_id for each in first],
+            iods=[each.iod for each in first],
+            ephemeris_crcs=[source.ephemeris_crc for source in sources],
+            corrections={
+                kind: Items.of(tables.CORRECTION_ENTRIES[kind], [source.corrections[kind] for source in sources])
+                for kind in kinds
+            },
+            decorrelation={kind: [source.decorrelation.get(kind, math.nan) for source in sources] for kind in kinds},
+            availability_s=[source.source_availability_s for source in sources],
+        )
+
+
+def no_correction(number: int, kind: int) -> str:
+    return f"ranging source {number} has no correction of its own for message type {kind}"
+
+
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Frame:
     """What a station has to say in one frame; the epoch of the corrections is the start of the frame."""
 
     gps_week: int
     tow_s: float
-    sources: tuple[SourceCorrection, ...]
+    sources: Sources
     station: Type2
     approaches: tuple[FasDataSet | UnknownDataSet, ...] = ()
     predictions: Type5 | None = None

@@ -105,11 +105,20 @@ def choose_first(
 
 
 def _sent(known: SourceHistory, frame: int) -> SourceHistory:
-    return replace(known, due=frame + FRAMES_BETWEEN, sent=True, run_left=max(known.run_left - 1, 0))
+    return SourceHistory(
+        key=known.key,
+        due=frame + FRAMES_BETWEEN,
+        sent=True,
+        changed=known.changed,
+        run_left=max(known.run_left - 1, 0),
+    )
 
 
 def _next(history: Mapping[int, SourceHistory], chosen: Sequence[int], frame: int, places: int) -> tuple[int, bool]:
-    waiting = sorted((source for source in history if source not in chosen), key=lambda s: (history[s].due, s))
+    limits = [(known.due, source) for source, known in history.items() if source not in chosen]
+    if not any(known.changed or not known.sent for known in history.values()):
+        return min(limits)[1], False
+    waiting = [source for _, source in sorted(limits)]
     others = {source: [other for other in waiting if other != source] for source in waiting}
     for source in waiting:
         if history[source].changed and _others_keep_limit(history, others[source], chosen, frame, places, 3):

@@ -12,16 +12,27 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Final
+from typing import Final, cast
 
 from gbas_core.gnss.gpstime import modified_z_count_s
 from gbas_vdb.coding.fec import MAX_APPLICATION_BYTES, encode_fec
 from gbas_vdb.errors import ScheduleError
 from gbas_vdb.messages import tables
 from gbas_vdb.messages.block import CRC_BYTES, HEADER_BYTES, MAX_BLOCK_BYTES, encode_block, encode_body, wrap_body
-from gbas_vdb.messages.types import Correction30, FasDataSet, Type1, Type2, Type3, Type4, Type5, Type11, UnknownDataSet
+from gbas_vdb.messages.types import (
+    Correction30,
+    Correction100,
+    FasDataSet,
+    Type1,
+    Type2,
+    Type3,
+    Type4,
+    Type5,
+    Type11,
+    UnknownDataSet,
+)
 from gbas_vdb.transmission.burst import SLOT_NAMES, Burst
-from gbas_vdb.transmission.frame import Frame, ItemHistory, ScheduleParams, ScheduleState, SourceCorrection
+from gbas_vdb.transmission.frame import Frame, ItemHistory, ScheduleParams, ScheduleState, Sources, no_correction
 from gbas_vdb.transmission.rotation import SourceHistory, choose_first
 
 _WRAPPER_BYTES: Final = HEADER_BYTES + CRC_BYTES
@@ -105,59 +116,56 @@ def _names(slots: Sequence[int]) -> str:
 def _correction_messages(
     state: ScheduleState, frame: Frame, params: ScheduleParams
 ) -> tuple[list[Type1 | Type11], dict[int, SourceHistory]]:
-    by_source = {source.number: source for source in frame.sources}
-    if len(by_source) != len(frame.sources):
+    sources = frame.sources
+    row_of = {number: row for row, number in enumerate(sources.numbers)}
+    if len(row_of) != len(sources.numbers):
         raise ScheduleError("a ranging source is there twice")
-    if len(by_source) > _MAX_SOURCES:
-        raise ScheduleError(f"{len(by_source)} ranging sources; a linked pair of messages holds {_MAX_SOURCES}")
-    places = _places(len(by_source))
-    keys = {number: (source.type1.iod, source.ephemeris_crc) for number, source in by_source.items()}
+    if len(row_of) > _MAX_SOURCES:
+        raise ScheduleError(f"{len(row_of)} ranging sources; a linked pair of messages holds {_MAX_SOURCES}")
+    for kind in params.message_types:
+        if kind not in sources.corrections and row_of:
+            raise ScheduleError(no_correction(sources.numbers[0], kind))
+    places = _places(len(row_of))
+    keys = dict(zip(sources.numbers, zip(sources.iods, sources.ephemeris_crcs, strict=True), strict=True))
     first, history = choose_first(state.sources, keys, state.frame, places)
-    rest = [number for number in sorted(by_source) if number not in first]
-    sizes = _group_sizes(len(by_source), params.message_types, params.slots)
+    rest = [number for number in sorted(row_of) if number not in first]
+    sizes = _group_sizes(len(row_of), params.message_types, params.slots)
     z_count_s = modified_z_count_s(frame.tow_s)
-    groups: list[tuple[int, tuple[SourceCorrection, ...]]] = []
+    groups: list[tuple[int, list[int]]] = []
     for place, size in enumerate(sizes):
         order = [*first[place : place + 1], *rest[: max(size - 1, 0)]]
         del rest[: max(size - 1, 0)]
-        flag = 0 if places == 1 else (1, 3)[place]
-        groups.append((flag, tuple(by_source[number] for number in order)))
-    messages = [_MESSAGES[kind](group, z_count_s, flag) for kind in params.message_types for flag, group in groups]
-    return messages, history
+        groups.append((0 if places == 1 else (1, 3)[place], [row_of[number] for number in order]))
+    return [
+        _MESSAGES[kind](sources, rows, z_count_s, flag) for kind in params.message_types for flag, rows in groups
+    ], history
 
 
-def _type1(group: Sequence[SourceCorrection], z_count_s: float, flag: int) -> Type1:
-    if not group:
+def _type1(sources: Sources, rows: list[int], z_count_s: float, flag: int) -> Type1:
+    if not rows:
         return Type1(modified_z_count_s=z_count_s, additional_message_flag=flag)
     return Type1(
         modified_z_count_s=z_count_s,
         additional_message_flag=flag,
-        ephemeris_decorrelation=group[0].decorrelation.get(1, math.nan),
-        ephemeris_crc=group[0].ephemeris_crc,
-        source_availability_s=group[0].source_availability_s,
-        measurements=tuple(source.type1 for source in group),
+        ephemeris_decorrelation=sources.decorrelation[1][rows[0]],
+        ephemeris_crc=sources.ephemeris_crcs[rows[0]],
+        source_availability_s=sources.availability_s[rows[0]],
+        measurements=cast("tuple[Correction100, ...]", sources.corrections[1].take(rows)),
     )
 
 
-def _type11(group: Sequence[SourceCorrection], z_count_s: float, flag: int) -> Type11:
-    measurements = []
-    for source in group:
-        correction = source.corrections.get(11)
-        if not isinstance(correction, Correction30) or correction.ranging_source_id != source.number:
-            raise ScheduleError(f"ranging source {source.number} has no correction of its own for message type 11")
-        measurements.append(correction)
+def _type11(sources: Sources, rows: list[int], z_count_s: float, flag: int) -> Type11:
+    if not rows:
+        return Type11(modified_z_count_s=z_count_s, additional_message_flag=flag)
     return Type11(
         modified_z_count_s=z_count_s,
         additional_message_flag=flag,
-        ephemeris_decorrelation_d=group[0].decorrelation.get(11, math.nan) if group else math.nan,
-        measurements=tuple(measurements),
+        ephemeris_decorrelation_d=sources.decorrelation[11][rows[0]],
+        measurements=cast("tuple[Correction30, ...]", sources.corrections[11].take(rows)),
     )
 
 
-_MESSAGES: Final[dict[int, Callable[[Sequence[SourceCorrection], float, int], Type1 | Type11]]] = {
-    1: _type1,
-    11: _type11,
-}
+_MESSAGES: Final[dict[int, Callable[[Sources, list[int], float, int], Type1 | Type11]]] = {1: _type1, 11: _type11}
 
 
 def _place_corrections(slots: Sequence[_Slot], blocks: Sequence[bytes]) -> None:
@@ -274,7 +282,7 @@ def _filler(used: int, params: ScheduleParams) -> list[bytes]:
 def sources_that_fit(station: Type2, approaches: Sequence[FasDataSet | UnknownDataSet], params: ScheduleParams) -> int:
     """How many ranging sources a station can broadcast with its slots, and still send everything else in its turn."""
     items = _periodic_items(
-        Frame(gps_week=0, tow_s=0.0, sources=(), station=station, approaches=tuple(approaches)), params
+        Frame(gps_week=0, tow_s=0.0, sources=Sources.of(()), station=station, approaches=tuple(approaches)), params
     )
     for n_sources in range(_MAX_SOURCES, -1, -1):
         sizes = _group_sizes(n_sources, params.message_types, params.slots)

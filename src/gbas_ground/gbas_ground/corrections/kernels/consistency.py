@@ -181,50 +181,74 @@ def summarise_corrections(
     n_failed : int
         Satellites and tests that fail.
     """
-    n_tau, n_receivers, n_sats = b_m.shape
+    n_sats = len(count)
     statistic, threshold = np.full((3, n_sats), np.nan), np.full((3, n_sats), np.nan)
     failed, due = np.zeros((3, n_sats), dtype=np.bool_), np.zeros((3, n_sats), dtype=np.bool_)
-    n_failed = 0
     for i in range(n_sats):
-        worst = np.full(3, -np.inf)
-        has_rate = count[i] > 0.0
-        for t in range(n_tau):
-            has_rate = has_rate and math.isfinite(rrc_mps[t, i])
-        for m in range(n_receivers):
-            due[0, i] = due[0, i] or (used[m, i] and count[i] >= 2.0)
-        due[1, i], due[2, i] = count[i] > 0.0, has_rate
-        for t in range(n_tau):
-            limit = b_limit_m(sigma_m[t, i], count[i], settings.k_b)
-            for m in range(n_receivers):
-                compare(
-                    0, i, abs(b_m[t, m, i]), limit, used[m, i] and count[i] >= 2.0, worst, statistic, threshold, failed
-                )
-            compare(1, i, abs(prc_m[t, i]), settings.max_prc_m, due[1, i], worst, statistic, threshold, failed)
-            compare(2, i, abs(rrc_mps[t, i]), settings.max_rrc_mps, due[2, i], worst, statistic, threshold, failed)
-        for test in range(3):
-            n_failed += failed[test, i]
+        due[1, i] = due[2, i] = count[i] > 0.0
+        for t in range(len(rrc_mps)):
+            due[2, i] = due[2, i] and math.isfinite(rrc_mps[t, i])
+    n_failed = compare_b_values(used, count, b_m, sigma_m, settings.k_b, statistic[0], threshold[0], failed[0], due[0])
+    n_failed += compare_sizes(prc_m, settings.max_prc_m, statistic[1], threshold[1], failed[1], due[1])
+    n_failed += compare_sizes(rrc_mps, settings.max_rrc_mps, statistic[2], threshold[2], failed[2], due[2])
     return statistic, threshold, failed, due, n_failed
 
 
 @compiled
-def compare(
-    test: int,
-    i: int,
-    value: float,
-    limit: float,
-    applies: bool,
-    worst: FloatArray,
+def excess_of(value: float, limit: float) -> float:
+    """How far a value is over its limit, as a part of it; minus infinity where either is missing."""
+    excess = (value - limit) / abs(limit)
+    return -math.inf if math.isnan(excess) else excess
+
+
+@compiled
+def compare_b_values(
+    used: BoolArray,
+    count: FloatArray,
+    b_m: FloatArray,
+    sigma_m: FloatArray,
+    k_b: float,
     statistic: FloatArray,
     threshold: FloatArray,
     failed: BoolArray,
-) -> None:
-    """One comparison of a satellite: it fails above its limit, and where either is missing; the worst one is kept."""
-    if applies and not value <= limit:
-        failed[test, i] = True
-    excess = (value - limit) / abs(limit)
-    if excess > worst[test] or math.isnan(threshold[test, i]):
-        statistic[test, i], threshold[test, i] = value, limit
-        worst[test] = max(worst[test], -math.inf if math.isnan(excess) else excess)
+    due: BoolArray,
+) -> int:
+    """Fill in the worst B value of each satellite; one fails above its limit, and where either is missing."""
+    n_failed = 0
+    for i in range(len(count)):
+        worst = -math.inf
+        for t in range(b_m.shape[0]):
+            limit = b_limit_m(sigma_m[t, i], count[i], k_b)
+            for m in range(b_m.shape[1]):
+                value, applies = abs(b_m[t, m, i]), used[m, i] and count[i] >= 2.0
+                due[i] = due[i] or applies
+                failed[i] = failed[i] or (applies and not value <= limit)
+                if excess_of(value, limit) > worst or t == m == 0:
+                    worst, statistic[i], threshold[i] = excess_of(value, limit), value, limit
+        n_failed += failed[i]
+    return n_failed
+
+
+@compiled
+def compare_sizes(
+    values: FloatArray,
+    limit: float,
+    statistic: FloatArray,
+    threshold: FloatArray,
+    failed: BoolArray,
+    due: BoolArray,
+) -> int:
+    """Fill in the largest of each satellite's ``(tau, N)`` values; one that is due fails above its limit or missing."""
+    n_failed = 0
+    for i in range(len(due)):
+        worst, threshold[i] = -math.inf, limit
+        for t in range(len(values)):
+            value = abs(values[t, i])
+            failed[i] = failed[i] or (due[i] and not value <= limit)
+            if excess_of(value, limit) > worst or t == 0:
+                worst, statistic[i] = excess_of(value, limit), value
+        n_failed += failed[i]
+    return n_failed
 
 
 @compiled

@@ -62,7 +62,9 @@ class Satellites(NamedTuple):
         Those that every required monitor of signals could judge.
     cause : (N,) int array
         Of exclusions, clear for `clear_s`.
-    clear_s, elevation_rad, ephemeris_crc, count : (N,) arrays
+    clear_s, elevation_rad, ephemeris_crc : (N,) arrays
+    receivers : (N,) array
+        How many are behind each correction.
     prc_m, rrc_mps : (tau, N) arrays
     sigmas_m : (3, N) array
     """
@@ -72,7 +74,7 @@ class Satellites(NamedTuple):
     clear_s: FloatArray
     elevation_rad: FloatArray
     ephemeris_crc: FloatArray
-    count: FloatArray
+    receivers: FloatArray
     prc_m: FloatArray
     rrc_mps: FloatArray
     sigmas_m: FloatArray
@@ -88,55 +90,70 @@ def state_of_exclusion(clear_s: float) -> float:
 def satellite_states(
     channels: Channels, satellites: Satellites, min_receivers: int, mask_rad: float
 ) -> tuple[FloatArray, FloatArray]:
-    """State and cause of every satellite, each ``(N,)``."""
-    n_sats = len(satellites.count)
+    """State and cause of every satellite, each ``(N,)``: of several reasons against its use the first."""
+    n_sats = len(satellites.receivers)
     state, cause = np.empty(n_sats), np.empty(n_sats)
     for i in range(n_sats):
-        state[i], cause[i] = satellite_state(channels, satellites, i, min_receivers, mask_rad)
+        judged, elevation_rad = satellites.judged[i], satellites.elevation_rad[i]
+        seen, ready, settled, settling, of_channels = False, 0, 0, 0, 0
+        for m in range(len(channels.tracked)):
+            seen = seen or channels.tracked[m, i]
+            own, of_receiver = channels.cause[m, i], channels.receiver_cause[m]
+            of_channels = max(of_channels, of_receiver if channels.tracked[m, i] and of_receiver != 0 else own)
+            if own == 0 and of_receiver == 0:
+                settled += channels.settled[m, i]
+                if channels.settled[m, i] and judged:
+                    ready += 1
+                elif math.isfinite(channels.age_s[m, i]):
+                    settling += 1
+        visible = elevation_rad >= mask_rad
+        if not seen or not visible or math.isnan(satellites.ephemeris_crc[i]):
+            known = not math.isnan(elevation_rad + satellites.ephemeris_crc[i])
+            state[i], cause[i] = state_of_unseen(seen, visible, known)
+        elif satellites.cause[i] != 0:
+            state[i], cause[i] = state_of_exclusion(satellites.clear_s[i]), float(satellites.cause[i])
+        elif satellites.receivers[i] < min_receivers:
+            unmonitored = not judged and settled >= min_receivers
+            state[i], cause[i] = state_of_few(ready, settling, unmonitored, of_channels, min_receivers)
+        else:
+            sigma_fits, has_rate = True, True
+            for each in range(len(satellites.sigmas_m)):
+                sigma_fits = sigma_fits and 0.0 < satellites.sigmas_m[each, i] <= MAX_SIGMA_M
+            for t in range(len(satellites.prc_m)):
+                has_rate = has_rate and math.isfinite(satellites.prc_m[t, i] + satellites.rrc_mps[t, i])
+            state[i], cause[i] = state_of_corrected(sigma_fits, has_rate)
     return state, cause
 
 
 @compiled
-def satellite_state(
-    channels: Channels, satellites: Satellites, i: int, min_receivers: int, mask_rad: float
-) -> tuple[float, float]:
-    """State and cause of one satellite: of several reasons against its use the first."""
-    seen, ready, settled, settling, of_channels = False, 0, 0, 0, 0
-    for m in range(len(channels.tracked)):
-        seen = seen or channels.tracked[m, i]
-        cause, of_receiver = channels.cause[m, i], channels.receiver_cause[m]
-        of_channels = max(of_channels, of_receiver if channels.tracked[m, i] and of_receiver != 0 else cause)
-        if cause == 0 and of_receiver == 0:
-            settled += channels.settled[m, i]
-            if channels.settled[m, i] and satellites.judged[i]:
-                ready += 1
-            elif math.isfinite(channels.age_s[m, i]):
-                settling += 1
-    visible = satellites.elevation_rad[i] >= mask_rad
-    short = satellites.count[i] < min_receivers
-    waiting = short and ready < min_receivers <= ready + settling
+def state_of_unseen(seen: bool, visible: bool, known: bool) -> tuple[float, float]:
+    """Of a satellite that is not seen, not visible, or whose orbit is not known."""
     if not seen:
         return _NOT_TRACKED, _CAUSE_NOT_TRACKED if visible else _CAUSE_NONE
-    if math.isnan(satellites.elevation_rad[i] + satellites.ephemeris_crc[i]):
-        return _EXCLUDED, _NO_EPHEMERIS
-    if not visible:
-        return _EXCLUDED, _BELOW_MASK
-    if satellites.cause[i] != 0:
-        return state_of_exclusion(satellites.clear_s[i]), float(satellites.cause[i])
-    if waiting:
-        monitors = not satellites.judged[i] and settled >= min_receivers
-        return _SETTLING, _UNMONITORED if monitors else _CAUSE_SETTLING
-    if short and of_channels >= FIRST_LATCHED:
+    return _EXCLUDED, _BELOW_MASK if known else _NO_EPHEMERIS
+
+
+@compiled
+def state_of_few(
+    ready: int, settling: int, unmonitored: bool, of_channels: int, min_receivers: int
+) -> tuple[float, float]:
+    """Of a satellite with fewer receivers behind its correction than the station needs.
+
+    So many channels are ready and so many settling; `of_channels` is the largest cause of exclusions of its channels.
+    """
+    if ready < min_receivers <= ready + settling:
+        return _SETTLING, _UNMONITORED if unmonitored else _CAUSE_SETTLING
+    if of_channels >= FIRST_LATCHED:
         return _EXCLUDED, float(of_channels)
-    if short:
-        return _EXCLUDED, _TOO_FEW_COMMON if ready >= min_receivers else _TOO_FEW_RECEIVERS
-    for each in range(len(satellites.sigmas_m)):
-        if not 0.0 < satellites.sigmas_m[each, i] <= MAX_SIGMA_M:
-            return _EXCLUDED, _SIGMA_TOO_LARGE
-    for t in range(len(satellites.prc_m)):
-        if not math.isfinite(satellites.prc_m[t, i] + satellites.rrc_mps[t, i]):
-            return _EXCLUDED, _NO_RATE
-    return USABLE, _CAUSE_NONE
+    return _EXCLUDED, _TOO_FEW_COMMON if ready >= min_receivers else _TOO_FEW_RECEIVERS
+
+
+@compiled
+def state_of_corrected(sigma_fits: bool, has_rate: bool) -> tuple[float, float]:
+    """Of a satellite with enough receivers behind its correction."""
+    if not sigma_fits:
+        return _EXCLUDED, _SIGMA_TOO_LARGE
+    return (USABLE, _CAUSE_NONE) if has_rate else (_EXCLUDED, _NO_RATE)
 
 
 @compiled
@@ -146,31 +163,26 @@ def has_row(state: float, cause: float) -> bool:
 
 
 @compiled
-def channel_state(channels: Channels, m: int, i: int, state: float, cause: float) -> tuple[float, float]:
-    """State and cause of one channel, of a satellite in a state with a cause.
-
-    What is wrong with a channel itself comes before what is wrong with its satellite.
-    """
-    if channels.cause[m, i] != 0:
-        return state_of_exclusion(channels.clear_s[m, i]), float(channels.cause[m, i])
-    if channels.receiver_cause[m] != 0:
-        return state_of_exclusion(channels.receiver_clear_s[m]), float(channels.receiver_cause[m])
-    if not channels.tracked[m, i]:
+def state_of_free(tracked: bool, used: bool, settling: bool, state: float, cause: float) -> tuple[float, float]:
+    """Of a channel that nothing excludes, of a satellite in a state with a cause."""
+    if not tracked:
         return _NOT_TRACKED, _CAUSE_NOT_TRACKED
-    if channels.used[m, i] and state == USABLE:
+    if used and state == USABLE:
         return USABLE, _CAUSE_NONE
-    if math.isfinite(channels.age_s[m, i]) and not channels.settled[m, i] and cause != _BELOW_MASK:
+    if settling and cause != _BELOW_MASK:
         return _SETTLING, _CAUSE_SETTLING
     # a channel that is ready and not used has its satellite's reason, or its receiver is not in use
     return _EXCLUDED if state == USABLE else state, _TOO_FEW_COMMON if cause == _CAUSE_NONE else cause
 
 
 @compiled
-def time_in_state(state: float, cause: float, before: FloatArray, elapsed_s: float) -> float:
-    """Time in a state with a cause; `before` are those of the epoch before and their time [s]."""
-    if state == before[0] and cause == before[1] and not math.isnan(before[2]):
-        return before[2] + elapsed_s
-    return 0.0
+def enter(
+    table: FloatArray, before: FloatArray, row: int, i: int, state: float, cause: float, elapsed_s: float
+) -> None:
+    """Enter a state with a cause, and how long it has been so [s]."""
+    table[0, row, i], table[1, row, i], table[2, row, i] = state, cause, 0.0
+    if state == before[0, row, i] and cause == before[1, row, i] and not math.isnan(before[2, row, i]):
+        table[2, row, i] = before[2, row, i] + elapsed_s
 
 
 @compiled
@@ -199,16 +211,23 @@ def channel_table(
     for i in range(len(state)):
         if not has_row(state[i], cause[i]):
             continue
-        table[0, 0, i], table[1, 0, i] = state[i], cause[i]
-        table[2, 0, i] = time_in_state(state[i], cause[i], before[:, 0, i], elapsed_s)
+        enter(table, before, 0, i, state[i], cause[i], elapsed_s)
         shown = False
         for m in range(len(channels.tracked)):
             shown = shown or channels.tracked[m, i] or channels.cause[m, i] != 0
-        if shown:
-            for m in range(len(channels.tracked)):
-                its_state, its_cause = channel_state(channels, m, i, state[i], cause[i])
-                table[0, 1 + m, i], table[1, 1 + m, i] = its_state, its_cause
-                table[2, 1 + m, i] = time_in_state(its_state, its_cause, before[:, 1 + m, i], elapsed_s)
+        for m in range(len(channels.tracked) if shown else 0):
+            # what is wrong with a channel itself comes before what is wrong with its satellite
+            own, of_receiver = channels.cause[m, i], channels.receiver_cause[m]
+            if own != 0:
+                its_state, its_cause = state_of_exclusion(channels.clear_s[m, i]), float(own)
+            elif of_receiver != 0:
+                its_state, its_cause = state_of_exclusion(channels.receiver_clear_s[m]), float(of_receiver)
+            else:
+                settling = math.isfinite(channels.age_s[m, i]) and not channels.settled[m, i]
+                its_state, its_cause = state_of_free(
+                    channels.tracked[m, i], channels.used[m, i], settling, state[i], cause[i]
+                )
+            enter(table, before, 1 + m, i, its_state, its_cause, elapsed_s)
     return table
 
 
@@ -221,42 +240,3 @@ def used_of_usable(used: BoolArray, state: FloatArray) -> tuple[BoolArray, BoolA
             channels[m, i] = used[m, i] and state[i] == USABLE
             receivers[m] = receivers[m] or channels[m, i]
     return channels, receivers
-
-
-@compiled
-def on_axis(values: FloatArray, state: FloatArray, n_rows: int) -> FloatArray:
-    """Values ``(m, N)`` of usable satellites, with room for more ``(n_rows, N)``."""
-    result = np.full((n_rows, len(state)), np.nan)
-    for row in range(len(values)):
-        for i in range(len(state)):
-            if state[i] == USABLE:
-                result[row, i] = values[row, i]
-    return result
-
-
-@compiled
-def by_receiver(
-    b_m: FloatArray, used: BoolArray, state: FloatArray, cause: FloatArray, n_products: int, n_rows: int
-) -> tuple[FloatArray, FloatArray]:
-    """B values ``(tau, R, N)`` of usable satellites, and 1 where a channel is used: ``(n_products, n_rows, N)``."""
-    values = np.full((n_products, n_rows, len(state)), np.nan)
-    flags = np.full((n_products, n_rows, len(state)), np.nan)
-    for t in range(b_m.shape[0]):
-        for m in range(b_m.shape[1]):
-            for i in range(len(state)):
-                if state[i] == USABLE:
-                    values[t, m, i] = b_m[t, m, i]
-                if has_row(state[i], cause[i]):
-                    flags[t, m, i] = 1.0 if used[m, i] else 0.0
-    return values, flags
-
-
-@compiled
-def where_row(values: FloatArray, state: FloatArray, cause: FloatArray) -> FloatArray:
-    """Values ``(m, N)`` of satellites of which there is anything to say."""
-    result = np.full(values.shape, np.nan)
-    for row in range(len(values)):
-        for i in range(len(state)):
-            if has_row(state[i], cause[i]):
-                result[row, i] = values[row, i]
-    return result
