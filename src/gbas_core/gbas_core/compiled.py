@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-call"
 """Compiled functions: loops over single numbers that numpy would be slow at.
 
 What is compiled is kept beside its module (or, where that cannot be written, in the user's cache) for the next process.
