@@ -12,7 +12,7 @@ of table 20-IV (also in its later rows).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,14 +27,12 @@ from gbas_core.signals import L1, SPEED_OF_LIGHT_MPS
 __all__ = [
     "GM_M3PS2",
     "RELATIVISTIC_F",
-    "SatellitePlace",
     "SatelliteState",
     "group_delay_s",
     "predicted_state",
     "rotated_range",
     "satellite_clock_s",
     "satellite_state",
-    "transmit_place",
     "transmit_state",
 ]
 
@@ -57,13 +55,6 @@ class SatelliteState:
     velocity_mps: FloatArray
     clock_s: FloatArray
     clock_drift: FloatArray
-
-
-class SatellitePlace(NamedTuple):
-    """Position and clock of :class:`SatelliteState` alone: half the work."""
-
-    position_m: FloatArray
-    clock_s: FloatArray
 
 
 def group_delay_s(ephemeris: Ephemeris, band: int | None = L1) -> FloatArray:
@@ -151,15 +142,6 @@ def transmit_state(
     received_s = np.broadcast_to(np.asarray(tow_rx_s, dtype=np.float64), shape)
     tow_tx_s = kernel.transmit_times_s(ephemeris.values, int(gps_week), _rows(received_s)[0], ranges_m)
     return satellite_state(ephemeris, gps_week, tow_tx_s.reshape(shape), band)
-
-
-def transmit_place(
-    ephemeris: Ephemeris, gps_week: int, tow_rx_s: float, pseudorange_m: FloatArray, band: int | None = L1
-) -> SatellitePlace:
-    """Position and clock of :func:`transmit_state`, to the same bits; missing where there is no pseudorange."""
-    ranges_m, shape = _rows(pseudorange_m)
-    place_m, clock_s = kernel.transmit_places(ephemeris.values, int(gps_week), float(tow_rx_s), ranges_m, _number(band))
-    return SatellitePlace(place_m.reshape(*shape[:-1], 3, shape[-1]), clock_s.reshape(shape))
 
 
 def rotated_range(receiver_xyz_m: FloatArray, sat_xyz_m: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -261,20 +261,6 @@ def transmit_place(values, s, gps_week, tow_rx_s, pseudorange_m, band):  # type:
 
 
 @compiled
-def transmit_places(values, gps_week, tow_rx_s, pseudorange_m, band):  # type: ignore[no-untyped-def]
-    """Positions ``(n, 3, N)`` and clocks ``(n, N)`` of receptions with pseudoranges ``(n, N)``; missing without one."""
-    n, n_sats = pseudorange_m.shape
-    place_m, clock_s = np.full((n, 3, n_sats), np.nan), np.full((n, n_sats), np.nan)
-    for i in range(n):
-        for s in range(n_sats):
-            if np.isfinite(values[_MESSAGE, s] + pseudorange_m[i, s]):
-                place_m[i, 0, s], place_m[i, 1, s], place_m[i, 2, s], clock_s[i, s] = transmit_place(
-                    values, s, gps_week, tow_rx_s, pseudorange_m[i, s], band
-                )
-    return place_m, clock_s
-
-
-@compiled
 def predicted_ranges(values, gps_week, tow_s, code_m, positions_m, enu, band):  # type: ignore[no-untyped-def]
     """Ranges and clocks ``(2, R, N)`` at receivers, elevations and azimuths ``(2, N)`` at the last of the positions.
 
