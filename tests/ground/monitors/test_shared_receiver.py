@@ -38,10 +38,8 @@ def made(at_receivers_m, rng=None, baselines=SITE):
     )
 
 
-def found(differences, baselines=SITE, planes=PLANES, least=3):
-    return shared_receiver(
-        differences, K * differences.sigma_m, baselines, planes, DUE, ELEVATION, AZIMUTH, least
-    )  # fmt: skip
+def found(differences, planes=PLANES, least=3):
+    return shared_receiver(differences, K * differences.sigma_m, planes, DUE, (ELEVATION, AZIMUTH), least)
 
 
 def plane(gradient_enu, satellites):
@@ -121,10 +119,10 @@ def test_an_edge_at_one_antenna_hits_satellites_along_a_line_and_names_nobody():
     at[2, :, SEEN[:4]] = 0.07
     differences = made(at)
     east = 0.6 * np.ones(N_SATS)
-    args = (differences, K * differences.sigma_m, SITE, PLANES, DUE)
+    args = (differences, K * differences.sigma_m, PLANES, DUE)
     along = np.where(np.arange(N_SATS) % 2, np.radians(60.0), np.radians(240.0))  # one vertical plane through the site
-    assert not shared_receiver(*args, east, along, 3).receivers.failed.any()
-    assert shared_receiver(*args, ELEVATION, AZIMUTH, 3).receivers.failed[2]
+    assert not shared_receiver(*args, (east, along), 3).receivers.failed.any()
+    assert shared_receiver(*args, (ELEVATION, AZIMUTH), 3).receivers.failed[2]
 
 
 def test_width_of_pierce_points():
@@ -141,7 +139,7 @@ def test_with_two_or_three_receivers_nobody_is_named():
         site = baselines_of(DEMO_SITE_M[:count], DEMO_SITE_M[0])
         at = np.zeros((count, 2, N_SATS))
         at[-1] = 0.07
-        assert not found(made(at, baselines=site), site, planes_of(site, BANDS)).receivers.failed.any()
+        assert not found(made(at, baselines=site), planes_of(site, BANDS)).receivers.failed.any()
 
 
 def test_missing_is_neither_quiet_nor_wrong():

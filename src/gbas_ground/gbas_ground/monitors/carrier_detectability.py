@@ -50,13 +50,12 @@ def detectable_fault(
     *,
     n_receivers: int = 1,
     k_md: float = 0.0,
-    interval_s: float = EPOCH_S,
 ) -> float:
     """Smallest fault of a satellite that is found by its age `since_s` at the latest, in the fault's unit.
 
     Parameters
     ----------
-    fault, since_s, params, interval_s
+    fault, since_s, params
         As of :func:`fault_response`.
     sigma_m : float
         Sigma of one receiver's carrier less its clock [m].
@@ -65,6 +64,7 @@ def detectable_fault(
     k_md : float
         Standard deviations for missed detection; 0 is one half.
     """
+    interval_s = params.interval_s
     ages = np.arange(round(since_s / interval_s) + 1) * interval_s
     age = _window_s(params, interval_s)
     variance = _fitted(age, np.zeros(age.size), params)[3:] * sigma_m**2 / n_receivers

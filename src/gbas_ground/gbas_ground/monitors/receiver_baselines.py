@@ -85,11 +85,9 @@ def _shared_receiver(differences: DoubleDifferences, inputs: MonitorInputs, stat
     return shared_receiver(
         differences,
         k_ffd * differences.sigma_m,
-        station.gradient_site.baselines,
         station.planes,
         inputs.due,
-        inputs.predicted.elevation_rad,
-        inputs.predicted.azimuth_rad,
+        (inputs.predicted.elevation_rad, inputs.predicted.azimuth_rad),
         least,
     )
 

@@ -70,11 +70,9 @@ class SharedReceiver:
 def shared_receiver(
     differences: DoubleDifferences,
     threshold_m: FloatArray,
-    baselines: Baselines,
     planes: tuple[Planes, ...],
     due: BoolArray,
-    elevation_rad: FloatArray,
-    azimuth_rad: FloatArray,
+    direction_rad: tuple[FloatArray, FloatArray],
     least: int,
 ) -> SharedReceiver:
     """Look for a receiver behind the double differences of one epoch.
@@ -84,12 +82,12 @@ def shared_receiver(
     differences : DoubleDifferences
     threshold_m : (B, F, N) array
         [m].
-    baselines : Baselines
     planes : tuple of Planes
         From :func:`planes_of`.
     due : (N,) bool array
         Satellites that count.
-    elevation_rad, azimuth_rad : (N,) arrays
+    direction_rad : pair of (N,) arrays
+        Elevations and azimuths.
     least : int
         Satellites that have to point to a receiver.
     """
@@ -105,7 +103,7 @@ def shared_receiver(
         and (number == number[worst]).sum() == 1
         and failing > 0
         and 2 * failing >= int(beyond.sum())
-        and across_m(elevation_rad[theirs], azimuth_rad[theirs]) >= _ACROSS_M
+        and across_m(*(each[theirs] for each in direction_rad)) >= _ACROSS_M
     )
     failed = (np.arange(len(number)) == worst) & named
     result = MonitorResult(

@@ -17,6 +17,7 @@ from gbas_core.signals import L1, SPEED_OF_LIGHT_MPS
 from gbas_ground.channels.predicted_ranges import predict_ranges
 from gbas_ground.consistency import Exclusions, Finding
 from gbas_ground.monitors.interface import MonitoredEpoch, MonitorInputs, MonitorOutput, Verdict
+from gbas_ground.monitors.kernels.ranges import looked_at
 from gbas_ground.monitors.monitor_table import Summaries
 from gbas_ground.monitors.registry import SIGNAL_MONITORS
 from gbas_ground.monitors.result import MonitorResult
@@ -150,23 +151,33 @@ def _ready(due: BoolArray, outputs: list[MonitorOutput]) -> BoolArray:
 def monitor_inputs(in_use: BoolArray, tracked: Tracked, station: PreparedStation) -> MonitorInputs:
     """What the monitors of signals are given."""
     received, exclusions, predicted = tracked.received, tracked.exclusions, tracked.predicted
-    usable = tracked.channel_ok & exclusions.usable_channels()
-    high = predicted.elevation_rad >= station.params.monitors.elevation_mask_rad
-    enough = (usable & tracked.settled).sum(axis=0) >= station.params.receivers.minimum
-    due = enough & np.isfinite(received.known.crc)
-    suspended = exclusions.receivers.excluded[:, np.newaxis] & ~exclusions.channels.excluded
+    _, n_sats = shape = tracked.channel_ok.shape
+    channels, satellites = np.empty((3, *shape), dtype=bool), np.empty((2, n_sats), dtype=bool)
+    looked_at(
+        tracked.channel_ok,
+        tracked.settled,
+        exclusions.channels.excluded,
+        exclusions.receivers.excluded,
+        exclusions.satellites.excluded,
+        predicted.elevation_rad,
+        float(station.params.monitors.elevation_mask_rad),
+        received.known.crc,
+        station.params.receivers.minimum,
+        channels,
+        satellites,
+    )
     return MonitorInputs(
         station=station,
         code_m=tracked.raw.code_m,
         carrier_m=tracked.tracks.carrier_m,
         cn0_dbhz=tracked.raw.cn0_dbhz,
         slipped=tracked.tracks.slipped,
-        usable=usable & high & ~exclusions.satellites.excluded,
-        ready=usable & tracked.settled,
-        suspended=tracked.channel_ok & tracked.settled & suspended,
+        usable=channels[0],
+        ready=channels[1],
+        suspended=channels[2],
         in_use=in_use,
-        due=due,
-        may_refer=due & ~exclusions.satellites.excluded,
+        due=satellites[0],
+        may_refer=satellites[1],
         predicted=predicted,
         rebased=received.changed,
         shift_m=_shift_m(tracked, station),

@@ -58,3 +58,36 @@ def common_channels(ready, failed, groups, least, steady):
             for sat in range(ready.shape[1]):
                 if groups[group, sat]:
                     steady[row, sat] = ready[row, sat] and number >= least and not failed[row, sat]
+
+
+@compiled
+def looked_at(
+    channel_ok, settled, channel_excluded, receiver_excluded, satellite_excluded, elevation_rad, mask_rad, crc, minimum,
+    channels, satellites,
+):  # fmt: skip
+    """What monitors may look at.
+
+    Parameters
+    ----------
+    channel_ok, settled, channel_excluded : (R, N) bool arrays
+    receiver_excluded, satellite_excluded : (R,) and (N,) bool arrays
+    elevation_rad, crc : (N,) arrays
+    mask_rad : float
+    minimum : int
+        Receivers a satellite needs.
+    channels : (3, R, N) bool array
+        Filled in: usable above the mask with their satellite, ready, and ready but for their receiver.
+    satellites : (2, N) bool array
+        Filled in: due, and due and not excluded.
+    """
+    for sat in range(len(crc)):
+        ready = 0
+        for row in range(len(receiver_excluded)):
+            sound = channel_ok[row, sat] and not channel_excluded[row, sat]
+            usable = sound and not receiver_excluded[row]
+            channels[0, row, sat] = usable and elevation_rad[sat] >= mask_rad and not satellite_excluded[sat]
+            channels[1, row, sat] = usable and settled[row, sat]
+            channels[2, row, sat] = sound and receiver_excluded[row] and settled[row, sat]
+            ready += 1 if channels[1, row, sat] else 0
+        satellites[0, sat] = ready >= minimum and np.isfinite(crc[sat])
+        satellites[1, sat] = satellites[0, sat] and not satellite_excluded[sat]
