@@ -69,6 +69,7 @@ def test_rows_are_selected_by_names() -> None:
         ({"test": [9.0, 1.0, 2.0]}, "test 9 is not a known code"),
         ({"sat": [33.0, 31.0, 5.0]}, "sat 33 is not a known code"),
         ({"sat": [NAN, 31.0, 5.0]}, "sat nan is not a known code"),
+        ({"sat": [-1.0, 31.0, 5.0]}, "sat -1 is not a known code"),
         ({"signal": [3.0, 1.0, 0.0]}, "signal 3 is not a known code"),
         ({"state": [0.0, 2.0, 1.0]}, "state 0 is not a known code"),
         ({"state": [4.0, 2.0, 1.0]}, "state 4 is not a known code"),

@@ -16,6 +16,7 @@ from gbas_vdb.messages import approach_tables, tables
 from gbas_vdb.messages import types as m
 from gbas_vdb.messages.block import BlockError, decode_block, decode_blocks, decode_body, encode_block, encode_body
 from gbas_vdb.messages.fields import Number
+from gbas_vdb.messages.fixed_places import Items
 from gbas_vdb.messages.layout import Layout, decode, encode
 from vdb_fields import TABLES, drawn_record, raw_bounds, same, value_of
 from vdb_oracle import CRC32Q, air_bits, bytes_of_air_bits, crc_remainder_bits, field_bits
@@ -73,6 +74,18 @@ def test_bits_agree_with_the_second_formulation(name: str, data: st.DataObject) 
     record, bits = drawn_record(data.draw, name, RECORDS)
     assert bits_of(LAYOUTS[name], record) == bits
     assert same(decode(LAYOUTS[name], reader_of(bits)), record)
+
+
+@pytest.mark.parametrize("name", ["type1", "type11"])
+@given(data=st.data())
+@settings(max_examples=60, deadline=None)
+def test_measurements_as_a_table_have_the_same_bits(name: str, data: st.DataObject) -> None:
+    record, bits = drawn_record(data.draw, name, RECORDS)
+    group = LAYOUTS[name].group
+    assert group is not None
+    table = Items.of(group.layout, record.measurements)
+    assert bits_of(LAYOUTS[name], replace(record, measurements=table)) == bits
+    assert same(table, record.measurements)
 
 
 def quantities() -> list[tuple[str, dict[str, Any]]]:

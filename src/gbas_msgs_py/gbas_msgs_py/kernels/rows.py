@@ -161,7 +161,7 @@ def satellite_columns(
     for row in range(0 if is_marker(table, n_head) else table.shape[0]):
         number = table[row, n_head]
         source = int(number) if 0.0 <= number < len(index_of) else -1
-        sat = index_of[source] if source == number else -1
+        sat = index_of[source] if source >= 0 and source == number else -1
         if sat < 0:
             if unknown < 0:
                 unknown = row
@@ -210,7 +210,7 @@ def check_codes(block: FloatArray, codes: Codes) -> tuple[int, int, int]:
         for coded in range(len(codes.place)):
             value = block[codes.place[coded] * n_rows + row]
             number = int(value) if 0.0 <= value < codes.known.shape[1] else -1
-            if number != value or not codes.known[coded, number]:
+            if number < 0 or number != value or not codes.known[coded, number]:
                 return row, coded, -1
             key += codes.weights[coded] * number
         if keyed:
