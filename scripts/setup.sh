@@ -92,11 +92,10 @@ done
 # environment keeps Python from writing byte code at each later one.
 env -u PYTHONDONTWRITEBYTECODE "$venv/bin/python" -c '
 import contextlib, importlib, pathlib, pkgutil
-from gbas_ground.ionosphere.position_errors import compile_ahead
 for name in sorted(path.parent.name for path in pathlib.Path("src").glob("*/setup.py")):
     for module in pkgutil.walk_packages(importlib.import_module(name).__path__, name + "."):
         with contextlib.suppress(ModuleNotFoundError):  # what only an installation of ROS has: launch
             importlib.import_module(module.name)
-compile_ahead()
 '
+env -u PYTHONDONTWRITEBYTECODE "$venv/bin/python" -m gbas_bench.rehearsal
 say "$venv is ready after $((SECONDS - started)) s"

@@ -10,23 +10,24 @@ from __future__ import annotations
 import hashlib
 import types
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any, Final, TypeVar, cast
 
+import numba
 import numpy as np
-from numba import njit
 from numba.core.caching import FunctionCache
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 _dispatchers: Final[list[Any]] = []
+_OPTIONS: Final[dict[str, Any]] = {"error_model": "numpy", "no_cfunc_wrapper": True}  # nothing in C calls them
 
 
 def compiled(function: _Function) -> _Function:
     """The function compiled, once a machine. No ``fastmath``: the order of sums and the meaning of NaN stay."""
-    dispatcher: Any = njit(error_model="numpy")(function)
+    dispatcher: Any = numba.njit(**_OPTIONS)(function)
     try:
         dispatcher._cache = _Kept(function, stamp_of(function))
     except (OSError, RuntimeError):  # numba's word for no folder that can be written
@@ -35,13 +36,16 @@ def compiled(function: _Function) -> _Function:
     return cast(_Function, dispatcher)
 
 
-def as_written(function: _Function) -> _Function:
+def as_written(function: Callable[..., Any]) -> Callable[..., Any]:
     """The Python of a compiled function: a formula of single numbers is one of arrays too."""
-    return cast(_Function, getattr(function, "py_func", function))
+    return cast("Callable[..., Any]", getattr(function, "py_func", function))
 
 
 def load_ahead() -> int:
-    """Load all that is kept of the functions known by now, so that no first call waits; how many of their forms."""
+    """Load what is kept of all loops known by now, so that no first call waits; how many they are.
+
+    What takes single numbers alone is compiled into them, and nothing calls it from Python.
+    """
     return sum(each._cache.load_all(each) for each in _dispatchers if isinstance(each._cache, _Kept))
 
 
@@ -75,10 +79,14 @@ class _Kept(FunctionCache):
         except Exception:
             return 0  # the first call will say so
         codegen = dispatcher.targetctx.codegen()
-        forms = [form for form, *rest in kept if (form, *rest) == self._index_key(form, codegen)]
+        forms = [form for form, *rest in kept if _is_loop(form) and (form, *rest) == self._index_key(form, codegen)]
         for form in forms:
             dispatcher.compile(form)
         return len(forms)
+
+
+def _is_loop(form: Iterable[Any]) -> bool:
+    return any(isinstance(each, numba.types.Array | numba.types.BaseTuple) for each in form)
 
 
 _noted: Final[set[str]] = set()

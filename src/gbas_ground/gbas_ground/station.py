@@ -18,7 +18,6 @@ from gbas_ground.broadcast import BroadcastState, broadcast_frame
 from gbas_ground.channels.ephemerides import EphemerisState, initial_ephemerides
 from gbas_ground.channels.tracking import initial_tracking
 from gbas_ground.consistency import no_exclusions
-from gbas_ground.ionosphere.position_errors import compile_ahead
 from gbas_ground.ionosphere.protection import initial_ionosphere
 from gbas_ground.long_term import initial_long_term
 from gbas_ground.params import GroundParams
@@ -79,8 +78,6 @@ class GroundStation:
     def __init__(self, params: GroundParams) -> None:
         self.params = params
         self._prepared = PreparedStation(params)
-        if params.ionosphere.protects:
-            compile_ahead()
 
     def initial_state(self) -> StationState:
         """A station that has just been switched on."""

@@ -14,6 +14,7 @@ import rclpy
 import rclpy.utilities
 from rclpy.signals import SignalHandlerOptions
 
+from gbas_core.compiled import load_ahead
 from gbas_node.node import EXIT_OK, POLL_S, GbasNode
 from gbas_node.transport import use_profile
 
@@ -39,6 +40,7 @@ def serve(factories: Sequence[Factory], args: Sequence[str] | None = None) -> in
         for factory in factories:
             nodes.append(factory())
             nodes[-1].check_overrides()
+        load_ahead()
     except (ValueError, OSError, RuntimeError) as error:
         print(_start_error(error), file=sys.stderr, flush=True)
         _release(nodes, None, orderly=False)

@@ -16,7 +16,7 @@ import numpy as np
 
 from gbas_core.gnss.observations import LARGEST_OBSERVATION
 from gbas_core.ranging.slips import ChannelObservations, SlipParams, SlipState, initial_slips, slip_step
-from gbas_core.ranging.smoothing import SmoothingParams, SmoothingState, initial_smoothing, smooth_bands
+from gbas_core.ranging.smoothing import Measured, SmoothingParams, SmoothingState, initial_smoothing, smooth_bands
 from gbas_core.record import BoolArray, FloatArray, IntArray
 from gbas_core.signals import N_BANDS
 
@@ -132,9 +132,8 @@ def channel_filter_step(
     """
     dt_s = float("nan") if state.last_ms is None else (epoch_ms - state.last_ms) / 1000.0
     slips, found = slip_step(state.slips, observed, dt_s, params.slips)
-    smoothing, smoothed_m = smooth_bands(
-        state.smoothing, observed.code_m, found.carrier_m, found.slipped, params.band_array, dt_s, params.smoothing
-    )
+    measured = Measured(observed.code_m, found.carrier_m, found.slipped)
+    smoothing, smoothed_m = smooth_bands(state.smoothing, measured, params.band_array, dt_s, params.smoothing)
     filtered = FilteredChannels(
         bands=params.bands,
         smoothed_m=smoothed_m,

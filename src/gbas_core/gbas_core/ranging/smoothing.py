@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final, Literal, get_args
+from typing import Final, Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -154,7 +154,7 @@ def smooth_step(
     )
     code, carrier = (np.ascontiguousarray(each, dtype=np.float64).reshape(rows) for each in (code_m, carrier_m))
     slip = np.ascontiguousarray(slipped, dtype=np.bool_).reshape(rows)
-    after, smoothed_m = smooth_bands(before, code, carrier, slip, _FIRST, dt_s, params)
+    after, smoothed_m = smooth_bands(before, Measured(code, carrier, slip), _FIRST, dt_s, params)
     new = SmoothingState(
         smoothed_m=smoothed_m.reshape(len(params.tau_s), *shape),
         carrier_m=after.carrier_m.reshape(shape),
@@ -164,14 +164,16 @@ def smooth_step(
     return new, new.smoothed_m
 
 
+class Measured(NamedTuple):
+    """Code and carrier of an epoch [m], and where they may have jumped since the last."""
+
+    code_m: FloatArray
+    carrier_m: FloatArray
+    slipped: BoolArray
+
+
 def smooth_bands(
-    state: SmoothingState,
-    code_m: FloatArray,
-    carrier_m: FloatArray,
-    slipped: BoolArray,
-    bands: IntArray,
-    dt_s: float,
-    params: SmoothingParams,
+    state: SmoothingState, measured: Measured, bands: IntArray, dt_s: float, params: SmoothingParams
 ) -> tuple[SmoothingState, FloatArray]:
     """The same for some of the bands: observations ``(R, N_BANDS, N_SATS)``, the state ``(R, bands, N_SATS)``.
 
@@ -181,7 +183,7 @@ def smooth_bands(
         Their places on the band axis of the observations.
     """
     smoothed_m, memory = smooth(
-        code_m, carrier_m, slipped, bands, state.smoothed_m, state.carrier_m, state.count, state.elapsed_s,
+        *measured, bands, state.smoothed_m, state.carrier_m, state.count, state.elapsed_s,
         float(dt_s), float(params.max_gap_s), params.tau_array_s, params.start_number,
     )  # fmt: skip
     last_m, count, elapsed_s = memory

@@ -8,7 +8,6 @@ Source: as :func:`gbas_core.positioning.wls.projection_matrix`, ICAO Annex 10 Vo
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -156,7 +155,6 @@ def geometries(
     return Geometries(level, wrong, int(not_safe))
 
 
-@lru_cache(maxsize=1)
 def compile_ahead() -> None:
     """Compile now, not at the first epoch that is screened; once a machine it takes some seconds."""
     one, ones, flags = np.ones(1), np.ones((1, 1)), np.ones((1, 1), dtype=bool)

@@ -33,6 +33,7 @@ from typing import TYPE_CHECKING, Annotated, Final, NamedTuple
 import numpy as np
 from scipy.special import ndtri
 
+from gbas_core.compiled import as_written
 from gbas_core.parameters import Derived, Parameter, ParameterError, parameters
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import N_SATS
@@ -287,7 +288,7 @@ def assumed_sigma_m(
     scale = np.hypot(factors[baselines.first], factors[baselines.second])[:, np.newaxis]
     sigma = noise.sigma_m(elevation_rad, params.bands[:1])
     reference = noise.sigma_m(np.array([reference_elevation_rad]), params.bands[:1])
-    return np.asarray(differenced_sigma_m.py_func(scale, sigma, reference))  # type: ignore[attr-defined]
+    return np.asarray(as_written(differenced_sigma_m)(scale, sigma, reference))
 
 
 # --- in the station

@@ -32,6 +32,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import ndtri
 
+from gbas_core.compiled import as_written
 from gbas_core.parameters import ParameterError
 from gbas_core.record import FloatArray
 from gbas_core.signals import IONO_RATIO, L1, WAVELENGTH_M
@@ -155,7 +156,7 @@ def wrap_m(value_m: ArrayLike, wavelength_m: FloatArray | float) -> FloatArray:
 
     Source: Khanafseh, Yang, Pervan, ION GNSS 2010; the paper, eq (2).
     """
-    result: FloatArray = wrapped.py_func(np.asarray(value_m, dtype=np.float64), wavelength_m)  # type: ignore[attr-defined]
+    result: FloatArray = as_written(wrapped)(np.asarray(value_m, dtype=np.float64), wavelength_m)
     return result
 
 

@@ -114,7 +114,7 @@ class Number:
             return self._special(value)
         if not -LARGEST < value < LARGEST:
             raise self._out_of_bounds(value)
-        raw = _counts_of(value, *self.ratio, self.offset, ROUNDINGS[self.rounding])
+        raw: int = _counts_of(value, *self.ratio, self.offset, ROUNDINGS[self.rounding])
         if self.scale is None and raw + self.offset != value:
             raise FieldError(f"{self.name} = {value!r} is not an integer")
         low, high = self.bounds
