@@ -118,8 +118,10 @@ def test_live_nodes_give_the_bits_of_the_offline_chain(
 
     probe.until(lambda: any(event.kind is EventKind.FINISHED for event in events), "the end of the replay", 300.0)
     assert replay.wait() == 0, replay.output
-    last = (protections, fixes, services, *scalars.values())
-    probe.until(lambda: min(map(len, last)) >= len(airborne), "the last protection level")
+    of_air = (solutions, protections, fixes, services, *scalars.values())
+    of_ground = (integrity, monitors, details, channels)
+    probe.until(lambda: min(map(len, of_air)) >= len(airborne), "the last protection level")
+    probe.until(lambda: min(map(len, of_ground)) >= len(ground), "the station's last tables")
 
     assert raw(tables.INTEGRITY, integrity) == raw(tables.INTEGRITY, [each.integrity for each in ground])
     assert raw(tables.MONITORS, monitors) == raw(tables.MONITORS, [each.monitored.statistics for each in ground])

@@ -7,17 +7,18 @@ A cache that cannot be read or written costs time and nothing else.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import types
 import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any, Final, TypeVar, cast
 
 import numba
 import numpy as np
-from numba.core.caching import FunctionCache
+from numba.core import caching
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -29,7 +30,8 @@ def compiled(function: _Function) -> _Function:
     """The function compiled, once a machine. No ``fastmath``: the order of sums and the meaning of NaN stay."""
     dispatcher: Any = numba.njit(**_OPTIONS)(function)
     try:
-        dispatcher._cache = _Kept(function, stamp_of(function))
+        kept = dispatcher._cache = _Kept(function, stamp_of(function))
+        dispatcher._compile_for_args = kept.noting_calls(dispatcher._compile_for_args)
     except (OSError, RuntimeError):  # numba's word for no folder that can be written
         _note_once("nowhere", "no folder for compiled functions can be written, so every process compiles them anew")
     _dispatchers.append(dispatcher)
@@ -42,19 +44,66 @@ def as_written(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def load_ahead() -> int:
-    """Load what is kept of all loops known by now, so that no first call waits; how many they are.
+    """Load what Python has called before of the functions known by now, so that no first call waits; how many.
 
-    What takes single numbers alone is compiled into them, and nothing calls it from Python.
+    Other functions are compiled into the loops that call them.
     """
     return sum(each._cache.load_all(each) for each in _dispatchers if isinstance(each._cache, _Kept))
 
 
-class _Kept(FunctionCache):
+_tried: Final[dict[str, OSError | None]] = {}
+
+
+class _OnceAFolder:
+    """A place for caches that is tried once, not for each function."""
+
+    def ensure_cache_path(self) -> None:
+        path = self.get_cache_path()  # type: ignore[attr-defined]
+        if path not in _tried:
+            try:
+                super().ensure_cache_path()  # type: ignore[misc]
+                _tried[path] = None
+            except OSError as error:
+                _tried[path] = error
+        if (failed := _tried[path]) is not None:
+            raise failed
+
+
+class _Given(_OnceAFolder, caching.UserProvidedCacheLocator):
+    """The folder of NUMBA_CACHE_DIR."""
+
+
+class _Beside(_OnceAFolder, caching.InTreeCacheLocator):
+    """Beside the module."""
+
+
+class _OfUser(_OnceAFolder, caching.UserWideCacheLocator):
+    """The user's cache."""
+
+
+class _Places(caching.CompileResultCacheImpl):
+    _locator_classes = [_Given, _Beside, _OfUser]  # noqa: RUF012
+
+
+class _Kept(caching.FunctionCache):
     """A function's cache that is valid for what the function calls, too, and never ends a program."""
+
+    _impl_class = _Places
 
     def __init__(self, function: Callable[..., Any], stamp: bytes) -> None:
         super().__init__(function)
         self.stamp = self._cache_file._source_stamp = stamp
+        self._called = Path(self._cache_file._index_path).with_suffix(".called")
+
+    def noting_calls(self, first_call: Callable[..., Any]) -> Callable[..., Any]:
+        """What Python's first call of a form leads to, with a note that Python calls it."""
+
+        def noted(*arguments: Any, **names: Any) -> Any:
+            with contextlib.suppress(OSError):
+                self._called.touch()
+            return first_call(*arguments, **names)
+
+        return noted
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         try:
@@ -73,20 +122,19 @@ class _Kept(FunctionCache):
             _note_once("write", f"compiled functions cannot be kept in {self.cache_path}: {error!r}")
 
     def load_all(self, dispatcher: Any) -> int:
-        """Load every form there is for this machine."""
+        """Load the first form there is for this machine, which is that of the set-up."""
+        if not self._called.exists():
+            return 0
         try:
             kept = list(self._cache_file._load_index())
         except Exception:
             return 0  # the first call will say so
         codegen = dispatcher.targetctx.codegen()
-        forms = [form for form, *rest in kept if _is_loop(form) and (form, *rest) == self._index_key(form, codegen)]
-        for form in forms:
-            dispatcher.compile(form)
-        return len(forms)
-
-
-def _is_loop(form: Iterable[Any]) -> bool:
-    return any(isinstance(each, numba.types.Array | numba.types.BaseTuple) for each in form)
+        for form, *rest in kept:
+            if (form, *rest) == self._index_key(form, codegen):
+                dispatcher.compile(form)
+                return 1
+        return 0
 
 
 _noted: Final[set[str]] = set()
