@@ -24,7 +24,7 @@ def total(values):
         result += twice(each) + 0.0 * formula.twice(each)
     return result
 
-if __name__ == "__main__":
+def main():
     import numpy as np
     loaded = load_ahead()
     print(total(np.ones(3)), loaded, sum(total.stats.cache_misses.values()), sum(total.stats.cache_hits.values()))
@@ -33,7 +33,7 @@ if __name__ == "__main__":
 
 def run(folder: Path, **environment: str) -> tuple[list[str], str]:
     done = subprocess.run(
-        [sys.executable, "-c", "import kernel, runpy; runpy.run_module('kernel', run_name='__main__')"],
+        [sys.executable, "-c", "import kernel; kernel.main()"],
         cwd=folder, env={**os.environ, "PYTHONPATH": str(folder), **environment},
         capture_output=True, text=True, check=True,
     )  # fmt: skip
