@@ -32,7 +32,7 @@ demo: $(READY)  ## fly one approach, write a bag and a report, print where they 
 	@$(RUN) gbas demo $(ARGS)
 
 test: $(READY)  ## run every test but the campaigns (ARGS="-k name" to choose)
-	@$(RUN) python -m pytest -n 2 --dist loadfile $(ARGS)
+	@$(RUN) python -m pytest -n 2 --dist loadfile --no-loadscope-reorder $(ARGS)
 
 campaign: $(READY)  ## run the long tests, and look for new examples (SEED=n repeats a run)
 	@echo "seed of the examples: $(SEED); again with: make campaign SEED=$(SEED)"
