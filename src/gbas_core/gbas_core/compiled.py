@@ -28,7 +28,7 @@ _OPTIONS: Final[dict[str, Any]] = {"error_model": "numpy", "no_cfunc_wrapper": T
 
 def compiled(function: _Function) -> _Function:
     """The function compiled, once a machine. No ``fastmath``: the order of sums and the meaning of NaN stay."""
-    if numba.config.DISABLE_JIT:
+    if getattr(numba.config, "DISABLE_JIT", False):
         return function
     dispatcher: Any = numba.njit(**_OPTIONS)(function)
     try:
