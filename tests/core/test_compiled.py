@@ -10,19 +10,29 @@ from pathlib import Path
 import pytest
 
 FORMULA = "from gbas_core.compiled import compiled\n\n@compiled\ndef twice(x):\n    return {factor} * x\n"
+BETWEEN = """from formula import twice
+from gbas_core.compiled import compiled
+
+@compiled
+def same(x):
+    return twice(x)
+"""
 CONSTANT = "OFFSET = {offset}\n"
 KERNEL = """
-import formula
+import elsewhere
 from constant import OFFSET
-from formula import twice
 from gbas_core.compiled import compiled, load_ahead
 
 @compiled
 def total(values):
     result = OFFSET
     for each in values:
-        result += twice(each) + 0.0 * formula.twice(each)
+        result += below(each)
     return result
+
+@compiled
+def below(x):  # what stands below its caller counts too
+    return elsewhere.same(x)
 
 def main():
     import numpy as np
@@ -46,6 +56,7 @@ def run(folder: Path, **environment: str) -> tuple[list[str], str]:
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     (tmp_path / "formula.py").write_text(FORMULA.format(factor="2.0"))
+    (tmp_path / "elsewhere.py").write_text(BETWEEN)
     (tmp_path / "constant.py").write_text(CONSTANT.format(offset="1.0"))
     (tmp_path / "kernel.py").write_text(KERNEL)
     return tmp_path

@@ -13,33 +13,7 @@ MAX_B_VALUE_M = 6.35
 
 
 def common_satellites(candidate, *, min_common, min_receivers):
-    """Receivers in use and the satellites they all track, for each constellation.
-
-    Parameters
-    ----------
-    candidate : (R, N) bool array
-        Channels that may be used.
-    min_common : int
-        Fewest common satellites a receiver clock is estimated from.
-    min_receivers : int
-        Fewest receivers.
-
-    Returns
-    -------
-    in_use : (k, R) bool array
-        Receivers in use, by constellation.
-    common : (k, N) bool array
-        S_c: the satellites of the constellation tracked by all receivers in use; all False where `min_common` cannot
-        be reached with `min_receivers`.
-
-    Notes
-    -----
-    The set "tracked by all receivers in use" lets one receiver that has lost most of its satellites take the whole
-    station with it. While the common set is too small, the receiver with the fewest channels (the last of equals) is
-    therefore not used.
-
-    Source: RTCA DO-245A 3.2 (S_c); the dropping of receivers is ours.
-    """
+    """As :func:`gbas_ground.corrections.kernels.formation.common_satellites` has it, constellation by constellation."""
     n_receivers = candidate.shape[0]
     in_use = np.zeros((len(CLOCK_GROUPS), n_receivers), dtype=bool)
     common = np.zeros(CLOCK_GROUPS.shape, dtype=bool)

@@ -12,7 +12,7 @@ import hashlib
 import types
 import warnings
 from collections.abc import Callable, Iterator
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any, Final, TypeVar, cast
 
@@ -32,7 +32,7 @@ def compiled(function: _Function) -> _Function:
         return function
     dispatcher: Any = numba.njit(**_OPTIONS)(function)
     try:
-        kept = dispatcher._cache = _Kept(function, stamp_of(function))
+        kept = dispatcher._cache = _Kept(function)
         dispatcher._compile_for_args = kept.noting_calls(dispatcher._compile_for_args)
     except (OSError, RuntimeError):  # numba's word for no folder that can be written
         _note_once("nowhere", "no folder for compiled functions can be written, so every process compiles them anew")
@@ -92,9 +92,8 @@ class _Kept(caching.FunctionCache):
 
     _impl_class = _Places
 
-    def __init__(self, function: Callable[..., Any], stamp: bytes) -> None:
+    def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
-        self.stamp = self._cache_file._source_stamp = stamp
         self._called = Path(self._cache_file._index_path).with_suffix(".called")
 
     def noting_calls(self, first_call: Callable[..., Any]) -> Callable[..., Any]:
@@ -107,8 +106,14 @@ class _Kept(caching.FunctionCache):
 
         return noted
 
+    @cached_property
+    def stamp(self) -> bytes:
+        """Made at the first use, when all that the function calls is there."""
+        return stamp_of(self._py_func)
+
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         try:
+            self._cache_file._source_stamp = self.stamp
             return super().load_overload(sig, target_context)
         except Exception as error:
             _note_once(
@@ -119,6 +124,7 @@ class _Kept(caching.FunctionCache):
 
     def save_overload(self, sig: Any, data: Any) -> None:
         try:
+            self._cache_file._source_stamp = self.stamp
             super().save_overload(sig, data)
         except Exception as error:
             _note_once("write", f"compiled functions cannot be kept in {self.cache_path}: {error!r}")
@@ -128,6 +134,7 @@ class _Kept(caching.FunctionCache):
         if not self._called.exists():
             return 0
         try:
+            self._cache_file._source_stamp = self.stamp
             kept = list(self._cache_file._load_index())
         except Exception:
             return 0  # the first call will say so
@@ -149,17 +156,22 @@ def _note_once(kind: str, text: str) -> None:
 
 
 def stamp_of(function: Callable[..., Any]) -> bytes:
-    """Digest of the function's module and of all from elsewhere that is compiled into it: functions and constants."""
-    digest = hashlib.sha256(_source(function.__code__.co_filename))
-    for name, value in _outside(function):
-        inner = getattr(value, "_cache", None)
-        if isinstance(inner, _Kept):
-            digest.update(inner.stamp)
-        elif isinstance(value, np.ndarray):
-            digest.update(name.encode() + str((value.dtype, value.shape)).encode() + value.tobytes())
-        elif isinstance(value, int | float | complex | str | bytes | tuple):
-            digest.update(f"{name}={value!r}".encode())
-    return digest.digest()
+    """Digest of all that is compiled into a function: functions it calls, by their modules, and constants."""
+    parts: set[bytes] = set()
+    seen, waiting = {function}, [function]
+    while waiting:
+        each = waiting.pop()
+        parts.add(_source(each.__code__.co_filename))
+        for name, value in _outside(each):
+            inner = getattr(value, "py_func", None)
+            if inner is not None and inner not in seen:
+                seen.add(inner)
+                waiting.append(inner)
+            elif isinstance(value, np.ndarray):
+                parts.add(f"{name} {value.dtype} {value.shape} ".encode() + value.tobytes())
+            elif isinstance(value, int | float | complex | str | bytes | tuple):
+                parts.add(f"{name}={value!r}".encode())
+    return hashlib.sha256(b"\0".join(hashlib.sha256(part).digest() for part in sorted(parts))).digest()
 
 
 def _outside(function: Callable[..., Any]) -> Iterator[tuple[str, Any]]:
@@ -182,4 +194,4 @@ def _codes(code: types.CodeType) -> Iterator[types.CodeType]:
 
 @cache
 def _source(path: str) -> bytes:
-    return Path(path).read_bytes()
+    return hashlib.sha256(Path(path).read_bytes()).digest()

@@ -12,7 +12,7 @@ processing modes", eq (8) to (12).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Final, Literal
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -71,35 +71,38 @@ L5_MULTIPATH_SURROGATE: Final = AirborneCurve(a0_m=0.08, a1_m=0.20, theta0_deg=1
 E1_GROUND_FACTOR_SURROGATE: Final = 0.9
 
 
-# --- formulas, on numbers and on arrays; compiled loops use them on numbers
+# --- formulas of single numbers for compiled loops; as written they are those of arrays too
 
 
+@compiled
 def curve_m(theta_deg, a0_m, a1_m, theta0_deg):  # type: ignore[no-untyped-def]
     """``a0 + a1 exp(-theta / theta0)`` [m]."""
     return a0_m + a1_m * np.exp(-theta_deg / theta0_deg)
 
 
+@compiled
 def tropo_m(refractivity, scale_m, sine, height_m):  # type: ignore[no-untyped-def]
     """TC of :func:`tropo_correction_m`; `sine` is that of the elevation [m]."""
     return refractivity * scale_m * 1e-6 / np.sqrt(0.002 + sine**2) * -np.expm1(-height_m / scale_m)
 
 
+@compiled
 def obliquity(elevation_rad):  # type: ignore[no-untyped-def]
     """F_pp of :func:`iono_obliquity` [-]."""
     ratio = IONO_EARTH_RADIUS_M / (IONO_EARTH_RADIUS_M + IONO_SHELL_HEIGHT_M) * np.cos(elevation_rad)
     return 1.0 / np.sqrt(1.0 - ratio**2)
 
 
+@compiled
 def iono_m(factor, gradient, distance_m, speed_mps, tau_s):  # type: ignore[no-untyped-def]
     """:func:`sigma_iono_m` with an obliquity [m]."""
     return factor * gradient * (distance_m + 2.0 * tau_s * speed_mps)
 
 
 @compiled
-def ground_curve(a0_m: float, a1_m: float, theta0_deg: float, a2_m: float, theta_deg: Any, number: Any) -> Any:
-    """Ground error of a :class:`GroundCurve` at an elevation for the mean of a number of receivers [m]."""
-    single = a0_m + a1_m * np.exp(-theta_deg / theta0_deg)
-    return np.sqrt(single**2 / number + a2_m**2)
+def ground_m(single_m, number, a2_m):  # type: ignore[no-untyped-def]
+    """Ground error of the mean of a number of receivers, from the curve of a single one and what they share [m]."""
+    return np.sqrt(single_m**2 / number + a2_m**2)
 
 
 def _elevation_deg(elevation_rad: ArrayLike, mask_rad: float) -> FloatArray:
@@ -115,13 +118,14 @@ def ground_curve_m(
     theta_deg = _elevation_deg(elevation_rad, mask_rad)
     number = np.asarray(n_receivers, dtype=np.float64)
     number = np.where(number >= 1.0, number, np.nan)
-    return np.asarray(as_written(ground_curve)(curve.a0_m, curve.a1_m, curve.theta0_deg, curve.a2_m, theta_deg, number))
+    single_m = as_written(curve_m)(theta_deg, curve.a0_m, curve.a1_m, curve.theta0_deg)
+    return np.asarray(as_written(ground_m)(single_m, number, curve.a2_m))
 
 
 def airborne_curve_m(curve: AirborneCurve, elevation_rad: ArrayLike, *, mask_rad: float = MASK_RAD) -> FloatArray:
     """Airborne error of `curve` [m]."""
     theta_deg = _elevation_deg(elevation_rad, mask_rad)
-    return np.asarray(curve_m(theta_deg, curve.a0_m, curve.a1_m, curve.theta0_deg))
+    return np.asarray(as_written(curve_m)(theta_deg, curve.a0_m, curve.a1_m, curve.theta0_deg))
 
 
 GROUND_CURVES: Final[dict[GroundAccuracy, tuple[GroundCurve, GroundCurve]]] = {
@@ -139,7 +143,7 @@ def sigma_pr_gnd_of(curves: FloatArray, elevation_rad: float, number: float, mas
     if not (theta_deg >= np.rad2deg(mask_rad) - EDGE_DEG and number >= 1.0):
         return np.nan
     a = curves[1 if theta_deg > GAD_C_STEP_DEG + EDGE_DEG else 0]
-    return float(ground_curve(a[0], a[1], a[2], a[3], theta_deg, number))
+    return float(ground_m(curve_m(theta_deg, a[0], a[1], a[2]), number, a[3]))
 
 
 def sigma_pr_gnd(
@@ -243,7 +247,7 @@ def tropo_correction_m(
     scale_m = np.where(scale_m > 0.0, scale_m, np.nan)
     sine = np.sin(np.deg2rad(_elevation_deg(elevation_rad, mask_rad)))
     height_m = np.asarray(height_difference_m, dtype=np.float64)
-    return np.asarray(tropo_m(np.asarray(refractivity), scale_m, sine, height_m))
+    return np.asarray(as_written(tropo_m)(np.asarray(refractivity), scale_m, sine, height_m))
 
 
 def sigma_tropo_m(
@@ -272,7 +276,7 @@ def iono_obliquity(elevation_rad: ArrayLike) -> FloatArray:
     """
     elevation = np.asarray(elevation_rad, dtype=np.float64)
     elevation = np.where(elevation >= 0.0, elevation, np.nan)
-    return np.asarray(obliquity(elevation))
+    return np.asarray(as_written(obliquity)(elevation))
 
 
 def sigma_iono_m(
@@ -310,4 +314,4 @@ def sigma_iono_m(
     factors = [np.asarray(value, dtype=np.float64) for value in (sigma_vig, distance_m, speed_mps, tau_s)]
     gradient, distance, speed, tau = (np.where(value >= 0.0, value, np.nan) for value in factors)
     factor = iono_obliquity(np.deg2rad(_elevation_deg(elevation_rad, mask_rad)))
-    return np.asarray(iono_m(factor, gradient, distance, speed, tau))
+    return np.asarray(as_written(iono_m)(factor, gradient, distance, speed, tau))

@@ -15,7 +15,7 @@ import numpy as np
 from gbas_core.compiled import compiled
 from gbas_core.gnss.kernels.frames import azimuth_elevation, fill_enu, geodetic
 from gbas_core.gnss.kernels.orbits import rotated_range
-from gbas_core.models import error_models
+from gbas_core.models import error_models as model
 from gbas_core.models.error_models import AIRFRAME_MULTIPATH, EDGE_DEG
 from gbas_core.positioning.kernels.wls import project
 from gbas_msgs_py.codes import Rejection
@@ -38,11 +38,6 @@ _MULTIPATH_A0_M, _MULTIPATH_A1_M, _MULTIPATH_THETA0_DEG = (
 )
 _NONE, _DISTANCE, _SIGMA = int(Rejection.NONE), int(Rejection.DISTANCE), int(Rejection.SIGMA)
 _ELEVATION, _RANGE_TEST = int(Rejection.ELEVATION), int(Rejection.RANGE_TEST)
-
-_curve_m: Final = compiled(error_models.curve_m)
-_tropo_m: Final = compiled(error_models.tropo_m)
-_obliquity: Final = compiled(error_models.obliquity)
-_iono_m: Final = compiled(error_models.iono_m)
 
 
 class Conditions(NamedTuple):
@@ -103,13 +98,13 @@ def look(
         theta_deg = np.rad2deg(elevation)
         if not theta_deg >= np.rad2deg(given.mask_rad) - EDGE_DEG:
             continue
-        noise_m = _curve_m(theta_deg, given.noise_a0_m, given.noise_a1_m, given.noise_theta0_deg)
-        multipath_m = _curve_m(theta_deg, _MULTIPATH_A0_M, _MULTIPATH_A1_M, _MULTIPATH_THETA0_DEG)
+        noise_m = model.curve_m(theta_deg, given.noise_a0_m, given.noise_a1_m, given.noise_theta0_deg)
+        multipath_m = model.curve_m(theta_deg, _MULTIPATH_A0_M, _MULTIPATH_A1_M, _MULTIPATH_THETA0_DEG)
         air_m = np.hypot(noise_m, multipath_m) * noise_factor[s]
         sine = np.sin(np.deg2rad(theta_deg))
-        tropo_m = abs(_tropo_m(given.refractivity_uncertainty, scale_m, sine, above_m))
-        iono_m = _iono_m(_obliquity(np.deg2rad(theta_deg)), gradient, distance_m, speed_mps, tau_s)
-        sky[TROPO, s] = _tropo_m(given.refractivity, scale_m, sine, above_m)
+        tropo_m = abs(model.tropo_m(given.refractivity_uncertainty, scale_m, sine, above_m))
+        iono_m = model.iono_m(model.obliquity(np.deg2rad(theta_deg)), gradient, distance_m, speed_mps, tau_s)
+        sky[TROPO, s] = model.tropo_m(given.refractivity, scale_m, sine, above_m)
         sky[SIGMA_AIR, s], sky[SIGMA_TROPO, s], sky[SIGMA_IONO, s] = air_m, tropo_m, iono_m
         sky[SIGMA, s] = np.sqrt(sigma_gnd_m[s] ** 2 + air_m**2 + tropo_m**2 + iono_m**2)
     return distance_m

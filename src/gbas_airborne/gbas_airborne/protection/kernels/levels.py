@@ -119,7 +119,7 @@ def h1_level_m(s, b_m, gnd2, other2, k_md_by_m):
                 bias_m += s[i] * b_m[j, i]
             variance += s[i] ** 2 * (ratio * gnd2[i] + other2[i])
         if behind_any:
-            worst_m = max(worst_m, abs(bias_m) + k_md_by_m[smallest] * np.sqrt(variance))
+            worst_m = np.maximum(worst_m, abs(bias_m) + k_md_by_m[smallest] * np.sqrt(variance))  # NaN stays
     return worst_m
 
 

@@ -82,7 +82,7 @@ def condition_number(matrix):
         square = 0.0
         for i in range(m):
             square += matrix[i, j] ** 2
-        smallest, largest = min(smallest, square), max(largest, square)
+        smallest, largest = np.minimum(smallest, square), np.maximum(largest, square)  # NaN stays
     return np.sqrt(largest / smallest) if np.isfinite(smallest) and smallest > 0.0 else np.inf
 
 

@@ -49,7 +49,7 @@ def broadcast_sigmas_m(
     for i in range(len(count)):
         if len(measured_m) == 0:
             base = sigma_pr_gnd_of(settings.curves, elevation_rad[i], count[i], settings.mask_rad)
-        elif count[i] > 0.0 and not elevation_rad[i] < settings.mask_rad:
+        elif count[i] > 0.0 and elevation_rad[i] >= settings.mask_rad:
             base = measured_m[i] / math.sqrt(count[i])
         else:
             continue
