@@ -83,11 +83,11 @@ def looked_at(
     for sat in range(len(crc)):
         ready = 0
         for row in range(len(receiver_excluded)):
-            sound = channel_ok[row, sat] and not channel_excluded[row, sat]
-            usable = sound and not receiver_excluded[row]
+            not_excluded = channel_ok[row, sat] and not channel_excluded[row, sat]
+            usable = not_excluded and not receiver_excluded[row]
             channels[0, row, sat] = usable and elevation_rad[sat] >= mask_rad and not satellite_excluded[sat]
             channels[1, row, sat] = usable and settled[row, sat]
-            channels[2, row, sat] = sound and receiver_excluded[row] and settled[row, sat]
+            channels[2, row, sat] = not_excluded and receiver_excluded[row] and settled[row, sat]
             ready += 1 if channels[1, row, sat] else 0
         satellites[0, sat] = ready >= minimum and np.isfinite(crc[sat])
         satellites[1, sat] = satellites[0, sat] and not satellite_excluded[sat]
