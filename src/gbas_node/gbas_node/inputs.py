@@ -1,9 +1,14 @@
-"""When a node heard something, and when what others still owe it is given up."""
+"""When a node heard something, when what others still owe it is given up, and what it must have heard first."""
 
 from __future__ import annotations
 
 import time
 from typing import Any, Final
+
+from rclpy.subscription import Subscription
+
+from gbas_core.gnss.ephemeris import Ephemeris
+from gbas_msgs_py.joining import ReceptionQueue
 
 _POLL_S: Final = 0.1
 _GRACE_S: Final = 0.005
@@ -51,3 +56,24 @@ class InputWatch:
             self._overdue_at = self.activity
             return _GRACE_S
         return 0.0
+
+
+class EphemerisInput:
+    """Ephemerides as a node receives them.
+
+    An executor may hand an epoch's observations over before ephemerides that came earlier on a topic of their own
+    (always possible with what came before it began). Drivers send an epoch when its ephemerides have been acknowledged,
+    so that they wait in the subscription by then: it is emptied at each epoch.
+    """
+
+    def __init__(self, queue: ReceptionQueue[Ephemeris], subscription: Subscription) -> None:
+        self._queue = queue
+        self._subscription = subscription
+
+    def take(self, key: int) -> tuple[Ephemeris, ...]:
+        """All that were received at or before the epoch `key` and have not been taken."""
+        handle, message_type = self._subscription.handle, self._subscription.msg_type
+        with handle:
+            while (taken := handle.take_message(message_type, True)) is not None:
+                self._subscription.callback(taken[0])
+        return self._queue.take(key)

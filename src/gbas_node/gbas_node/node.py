@@ -25,6 +25,7 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos_overriding_options import QoSOverridingOptions
+from rclpy.subscription import Subscription
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float64, Float64MultiArray, String, UInt8, UInt8MultiArray
 
@@ -40,7 +41,7 @@ from gbas_msgs_py.qos import qos_of
 from gbas_msgs_py.schema import SchemaError, TableSchema
 from gbas_msgs_py.tables import EPHEMERIS, PROGRESS, ProgressEpoch
 from gbas_node.descriptors import descriptor_of
-from gbas_node.inputs import InputWatch
+from gbas_node.inputs import EphemerisInput, InputWatch
 from gbas_node.params import NodeParams
 from gbas_node.publishers import TablePublisher, when_heard
 from gbas_node.start_gate import StartGate
@@ -197,20 +198,19 @@ class GbasNode(Node):
 
     def table_subscription(
         self, topic: str, schema: TableSchema[R], callback: Callable[[R], None], *, quiet: bool = False
-    ) -> None:
+    ) -> Subscription:
         """Call back with each record; with `quiet` they do not count as input whose absence is reported."""
         codec = TableCodec(schema)
-        self._subscription(Float64MultiArray, topic, lambda data: ros.table_from_bytes(data, codec), callback, quiet)
+        return self._subscription(Float64MultiArray, topic, lambda data: ros.table_from_bytes(data, codec), callback, quiet)
 
-    def ephemeris_queue(self) -> ReceptionQueue[Ephemeris]:
-        """Queue that fills with the broadcast ephemerides; each is taken at the epoch of its reception."""
+    def ephemeris_input(self) -> EphemerisInput:
+        """The broadcast ephemerides; each is taken at the epoch of its reception."""
         queue: ReceptionQueue[Ephemeris] = ReceptionQueue()
 
         def keep(ephemeris: Ephemeris) -> None:
             queue.add(epoch_key(ephemeris.gps_week, ephemeris.tow_s), ephemeris)
 
-        self.table_subscription(topics.EPHEMERIS, EPHEMERIS, keep, quiet=True)
-        return queue
+        return EphemerisInput(queue, self.table_subscription(topics.EPHEMERIS, EPHEMERIS, keep, quiet=True))
 
     def progress_subscription(self, reader: str, callback: Callable[[ProgressEpoch], None]) -> None:
         """Call back when a reader, named by its node or its topic, has finished with an epoch."""
@@ -231,7 +231,7 @@ class GbasNode(Node):
         decode: Callable[[bytes], Any],
         callback: Callable[[Any], None],
         quiet: bool,
-    ) -> None:
+    ) -> Subscription:
         def receive(data: bytes) -> None:
             self.inputs.activity += 1
             try:
@@ -245,7 +245,9 @@ class GbasNode(Node):
 
         options = QoSOverridingOptions.with_default_policies()
         profile = ros.qos_profile(qos_of(topic))
-        self.create_subscription(message_type, topic, receive, profile, qos_overriding_options=options, raw=True)
+        return self.create_subscription(
+            message_type, topic, receive, profile, qos_overriding_options=options, raw=True
+        )
 
     def problem(self, kind: str, detail: str = "") -> None:
         """Count something that went wrong without ending the node; diagnostics and the log show it."""

@@ -36,11 +36,11 @@ def serve(factories: Sequence[Factory], args: Sequence[str] | None = None) -> in
     nodes: list[GbasNode] = []
     use_profile(os.environ)
     try:
+        load_ahead()  # before there are subscriptions: once others see them, they are sent data
         rclpy.init(args=None if args is None else list(args), signal_handler_options=SignalHandlerOptions.NO)
         for factory in factories:
             nodes.append(factory())
             nodes[-1].check_overrides()
-        load_ahead()
     except (ValueError, OSError, RuntimeError) as error:
         print(_start_error(error), file=sys.stderr, flush=True)
         _release(nodes, None, orderly=False)

@@ -33,7 +33,7 @@ class Positioning(GbasNode):
         )
         self.solution = self.table_publisher(topics.AIRBORNE_SOLUTION, tables.SOLUTION, readers=1)
         self.publish_schemas()
-        self.ephemerides = self.ephemeris_queue()
+        self.ephemerides = self.ephemeris_input()
         self.burst_subscription(topics.VDB, self.on_burst)
         self.table_subscription(topics.AIRBORNE_OBSERVATIONS, tables.OBSERVATIONS, self.on_observations)
 

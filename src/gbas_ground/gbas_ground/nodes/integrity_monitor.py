@@ -34,7 +34,7 @@ class IntegrityMonitor(GbasNode):
         self.monitor_details = self.table_publisher(topics.GROUND_MONITOR_DETAILS, tables.MONITOR_DETAILS)
         self.channels = self.table_publisher(topics.GROUND_CHANNELS, tables.CHANNELS)
         self.publish_schemas()
-        self.ephemerides = self.ephemeris_queue()
+        self.ephemerides = self.ephemeris_input()
         for receiver, topic in zip(self.receivers, topics.GROUND_OBSERVATIONS, strict=False):
             self.table_subscription(topic, tables.OBSERVATIONS, partial(self.on_observations, receiver))
 
