@@ -10,7 +10,7 @@ from rclpy.duration import Duration
 from gbas_core.gnss.gpstime import epoch_key
 from gbas_msgs_py import tables, topics
 from gbas_node.node import GbasNode
-from gbas_node.serving import _executor
+from gbas_node.serving import light_executor
 from synthetic_ranges import TOW_S, WEEK, constellation
 
 pytestmark = pytest.mark.ros
@@ -28,7 +28,7 @@ def test_acknowledged_ephemerides_are_there_whatever_the_executor_has_done(probe
     assert [each.tow_s for each in received.take(key)] == [TOW_S]
     assert received.take(key) == ()
 
-    executor = _executor()  # has been told of two messages that are no longer there
+    executor = light_executor(probe.context)  # has been told of two messages that are no longer there
     executor.add_node(node)
     executor.spin_once(timeout_sec=0.1)
     assert [each.tow_s for each in received.take(key + 30_000)] == [TOW_S + 30.0]

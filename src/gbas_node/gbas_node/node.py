@@ -17,6 +17,7 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable
+from functools import partial
 from typing import Any, ClassVar, Final, TypeVar
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -200,8 +201,8 @@ class GbasNode(Node):
         self, topic: str, schema: TableSchema[R], callback: Callable[[R], None], *, quiet: bool = False
     ) -> Subscription:
         """Call back with each record; with `quiet` they do not count as input whose absence is reported."""
-        codec = TableCodec(schema)
-        return self._subscription(Float64MultiArray, topic, lambda data: ros.table_from_bytes(data, codec), callback, quiet)
+        decode = partial(ros.table_from_bytes, codec=TableCodec(schema))
+        return self._subscription(Float64MultiArray, topic, decode, callback, quiet)
 
     def ephemeris_input(self) -> EphemerisInput:
         """The broadcast ephemerides; each is taken at the epoch of its reception."""
@@ -245,9 +246,7 @@ class GbasNode(Node):
 
         options = QoSOverridingOptions.with_default_policies()
         profile = ros.qos_profile(qos_of(topic))
-        return self.create_subscription(
-            message_type, topic, receive, profile, qos_overriding_options=options, raw=True
-        )
+        return self.create_subscription(message_type, topic, receive, profile, qos_overriding_options=options, raw=True)
 
     def problem(self, kind: str, detail: str = "") -> None:
         """Count something that went wrong without ending the node; diagnostics and the log show it."""

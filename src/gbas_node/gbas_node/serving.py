@@ -12,6 +12,7 @@ from typing import Any, Final
 
 import rclpy
 import rclpy.utilities
+from rclpy.context import Context
 from rclpy.signals import SignalHandlerOptions
 
 from gbas_core.compiled import load_ahead
@@ -45,7 +46,7 @@ def serve(factories: Sequence[Factory], args: Sequence[str] | None = None) -> in
         print(_start_error(error), file=sys.stderr, flush=True)
         _release(nodes, None, orderly=False)
         return EXIT_BAD_START
-    executor = _executor()
+    executor = light_executor()
     for node in nodes:
         executor.add_node(node)
     orderly = False
@@ -82,15 +83,15 @@ def _release(nodes: Sequence[GbasNode], executor: Any, *, orderly: bool) -> None
     rclpy.utilities.try_shutdown()
 
 
-def _executor() -> Any:
+def light_executor(context: Context | None = None) -> Any:
     """The executor that costs least a message (117 against 235 us); the plain one where it is missing."""
     try:
         from rclpy.experimental.events_executor import EventsExecutor
     except ImportError:
         from rclpy.executors import SingleThreadedExecutor
 
-        return SingleThreadedExecutor()
-    return EventsExecutor()
+        return SingleThreadedExecutor(context=context)
+    return EventsExecutor(context=context)
 
 
 def _start_error(error: Exception) -> str:
