@@ -22,6 +22,6 @@ setup(
         (f"share/{PACKAGE}/config/schema", sorted(glob("config/schema/*.json"))),
         (f"share/{PACKAGE}/config/scenarios", sorted(glob("config/scenarios/*.yaml"))),
     ],
-    install_requires=["gbas_core", "gbas_msgs_py", "gbas_node", "gbas_sim", "rich", "PyYAML"],
+    install_requires=["gbas_core", "gbas_msgs_py", "gbas_node", "gbas_sim", "rich", "PyYAML", "setproctitle"],
     zip_safe=True,
 )

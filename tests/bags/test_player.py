@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import struct
-import subprocess
-import sys
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -23,6 +21,7 @@ from gbas_bringup.run_config import RunConfig
 from gbas_bringup.runs import execute
 from gbas_cli.replay import ReplayRequest, ReplayResult, play
 from gbas_msgs_py import topics
+from started_nodes import LoggedNode
 
 PLAYER, RECORDER = (NodeInstance(kind=NODE_KINDS[name]) for name in ("player", "recorder"))
 
@@ -208,16 +207,12 @@ def test_play_only_ends_by_itself(fake_bag: Any, tmp_path: Path, domain: int) ->
         (("bag:=/nowhere", "mode:=some"), "mode = 'some' is not one of 'inputs', 'all'"),
     ],
 )
-def test_bad_parameters_end_it_with_one_line(domain: int, parameters: tuple[str, ...], words: str) -> None:
+def test_bad_parameters_end_it_with_one_line(
+    domain: int, tmp_path: Path, parameters: tuple[str, ...], words: str
+) -> None:
     arguments = [part for each in parameters for part in ("-p", each)]
-    done = subprocess.run(
-        [sys.executable, "-m", "gbas_bags.player", "--ros-args", *arguments],
-        env=process_environment(domain=domain, isolated=True),
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
-    assert done.returncode == 2
-    (line,) = done.stderr.splitlines()
+    environment = process_environment(domain=domain, isolated=True)
+    code, output = LoggedNode("gbas_bags.player", ["--ros-args", *arguments], environment, tmp_path / "log").end()
+    assert code == 2
+    (line,) = output.splitlines()
     assert words in line

@@ -6,8 +6,6 @@ import os
 import random
 import resource
 import signal
-import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -35,6 +33,7 @@ from gbas_msgs_py import ros, tables, topics
 from gbas_msgs_py.qos import qos_of
 from gbas_node.pacing import Pacer
 from gbas_node.transport import use_profile
+from started_nodes import LoggedNode
 
 pytestmark = pytest.mark.ros
 
@@ -88,43 +87,29 @@ def source(domain: int) -> Iterator[Source]:
     source.close()
 
 
-class RecorderProcess:
+class RecorderProcess(LoggedNode):
     """A recorder."""
 
-    def __init__(self, domain: int, out: Path, *parameters: str, **popen: Any) -> None:
+    def __init__(self, domain: int, out: Path, log: Path, *parameters: str) -> None:
         self.out = out
         arguments = [part for each in (f"out:={out}", *parameters) for part in ("-p", each)]
-        self.popen = subprocess.Popen(
-            [sys.executable, "-m", "gbas_bags.recorder", "--ros-args", *arguments],
-            env=process_environment(domain=domain, isolated=True),
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            start_new_session=True,
-            **popen,
-        )
-
-    def end(self, number: signal.Signals = signal.SIGINT) -> tuple[int, str]:
-        """Exit code and output."""
-        if self.popen.poll() is None:
-            self.popen.send_signal(number)
-        output, _ = self.popen.communicate(timeout=60)
-        return self.popen.returncode, output
+        environment = process_environment(domain=domain, isolated=True)
+        super().__init__("gbas_bags.recorder", ["--ros-args", *arguments], environment, log)
 
 
 @pytest.fixture
 def recorder(domain: int, tmp_path: Path) -> Iterator[Callable[..., RecorderProcess]]:
     started: list[RecorderProcess] = []
 
-    def start(*parameters: str, out: Path | None = None, **popen: Any) -> RecorderProcess:
-        started.append(RecorderProcess(domain, out or tmp_path / "bag", *parameters, **popen))
+    def start(*parameters: str, out: Path | None = None) -> RecorderProcess:
+        log = tmp_path / f"recorder_{len(started)}.log"
+        started.append(RecorderProcess(domain, out or tmp_path / "bag", log, *parameters))
         return started[-1]
 
     yield start
     for each in started:
-        if each.popen.poll() is None:
-            each.popen.kill()
-            each.popen.communicate()
+        each.kill()
+        each.wait()
 
 
 def keys_in(bag: Path, **options: Any) -> dict[str, list[int]]:
@@ -150,9 +135,9 @@ def test_kill_loses_at_most_the_last_second(
             source.observe(topic, FIRST + 10 * number)
         number += 1
         time.sleep(0.005)  # paces the publisher; nothing depends on it
-    os.kill(process.popen.pid, signal.SIGKILL)
+    process.kill()
     killed_s = time.time()
-    process.popen.wait()
+    process.wait()
     result = recover(process.out)
     kept = keys_in(result.target)
     late_s = killed_s - ALLOWED_LOSS_S
@@ -176,7 +161,7 @@ def test_interrupt_keeps_everything(source: Source, recorder: Any, wait_until: A
             source.observe(topic, FIRST + 500 * number)
     for topic in RR[:2]:
         assert source.publisher(topic).wait_for_all_acked()
-    code, output = process.end()
+    code, output = process.end(signal.SIGINT)
     assert code == 0, output
     assert keys_in(process.out) == {topic: [FIRST + 500 * number for number in range(200)] for topic in RR[:2]}
     document = info(process.out).as_json()
@@ -204,7 +189,7 @@ def test_bag_is_laid_out_along_the_data_time(source: Source, recorder: Any, wait
     for number in range(3):
         source.observe(RR[0], FIRST + 500 * number)
     assert source.publisher(RR[0]).wait_for_all_acked()
-    process.end()
+    process.end(signal.SIGINT)
     week, tow_s = from_epoch_key(FIRST)
     first_ns = ros.stamp_of(week, tow_s).sec * 1_000_000_000
     messages = list(BagReader(process.out).messages())
@@ -234,7 +219,7 @@ def test_nothing_is_lost_at_full_speed(source: Source, recorder: Any, wait_until
             pacer.sent(FIRST + 500 * number, ("recorder",))
             number += 1
         source.executor.spin_once(timeout_sec=0.0 if pacer.may_send() else 0.01)
-    code, _ = process.end()
+    code, _ = process.end(signal.SIGINT)
     assert code == 0
     assert keys_in(process.out) == {topic: [FIRST + 500 * number for number in range(1500)] for topic in RR}
     assert info(process.out).as_json()["lost_in_transport"] == 0
@@ -250,7 +235,7 @@ def test_other_namespaces_and_named_topics_are_recorded(source: Source, recorder
     for name in (second, "/weather/pressure", "/weather/wind", "/elsewhere"):
         source.publisher(name).publish(Float64(data=1.5))
         assert source.publisher(name).wait_for_all_acked()
-    process.end()
+    process.end(signal.SIGINT)
     counts = {topic["topic"]: topic["messages"] for topic in info(process.out).as_json()["topics"]}
     assert {name: counts.get(name) for name in (second, "/weather/pressure", "/weather/wind")} == {
         second: 1,
@@ -272,8 +257,8 @@ def test_other_namespaces_and_named_topics_are_recorded(source: Source, recorder
 )
 def test_bad_parameters_end_it_with_one_line(recorder: Any, parameters: tuple[str, ...], words: str) -> None:
     process = recorder(*parameters)
-    output, _ = process.popen.communicate(timeout=60)
-    assert process.popen.returncode == 2
+    code, output = process.end()
+    assert code == 2
     (line,) = output.splitlines()
     assert words in line
 
@@ -282,20 +267,16 @@ def test_existing_bag_is_not_touched(recorder: Any, tmp_path: Path) -> None:
     (tmp_path / "bag").mkdir()
     (tmp_path / "bag" / "bag_0.mcap").write_text("mine")
     process = recorder()
-    output, _ = process.popen.communicate(timeout=60)
-    assert process.popen.returncode == 2
+    code, output = process.end()
+    assert code == 2
     assert "already exists" in output
     assert (tmp_path / "bag" / "bag_0.mcap").read_text() == "mine"
 
 
-def _small_files() -> None:
-    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (40_000, 40_000))
-
-
 def test_full_disk_ends_it_with_a_word(source: Source, recorder: Any, wait_until: Any) -> None:
     """A limit on the size of files stands for a disk that is full; what was written before can be saved."""
-    process = recorder("compression:=none", preexec_fn=_small_files)
+    process = recorder("compression:=none")
+    resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (40_000, 40_000))
     source.until_read(wait_until, RR[:1])
     stop = threading.Event()
 
@@ -308,11 +289,11 @@ def test_full_disk_ends_it_with_a_word(source: Source, recorder: Any, wait_until
     thread = threading.Thread(target=publish)
     thread.start()
     try:
-        output, _ = process.popen.communicate(timeout=60)
+        code, output = process.end()
     finally:
         stop.set()
         thread.join()
-    assert process.popen.returncode == 3, output
+    assert code == 3, output
     assert f"{process.out}: " in output
     assert "File too large" in output
     assert sum(recover(process.out).kept.values()) > 0

@@ -9,6 +9,7 @@ import os
 import signal
 import subprocess
 import sys
+import textwrap
 import threading
 import time
 from collections.abc import Callable
@@ -20,7 +21,7 @@ import yaml
 
 from gbas_bringup import launcher as module
 from gbas_bringup.environment import ament_prefix_path, free_domain, process_environment
-from gbas_bringup.launcher import Interrupted, Launcher, RunPlan
+from gbas_bringup.launcher import Interrupted, Launcher, Program, RunPlan
 from gbas_bringup.node_kinds import NODE_KINDS, NodeInstance, Stage
 from gbas_bringup.run_config import RunConfig
 from gbas_bringup.single_process import factory_of, split_arguments
@@ -59,18 +60,24 @@ OTHERS = ("ground", "aircraft", "recorder")
 STAGES = {"ground": Stage.GROUND, "aircraft": Stage.AIRBORNE, "recorder": Stage.RECORDER}
 
 
+def program(folder: Path, text: str, stage: Stage, *arguments: str) -> Program:
+    """A module of its own with a text as its ``main``."""
+    name = f"program_{len(list(folder.glob('program_*.py')))}_{folder.name}"
+    (folder / f"{name}.py").write_text(f"def main():\n{textwrap.indent(text, '    ')}\n")
+    return Program(name, arguments, stage)
+
+
 @pytest.fixture
 def launch(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., tuple[Launcher, list[tuple[str, str]]]]:
     """A launcher of small programs: three patient ones, and a driver that runs `driver` when they are ready."""
 
     def make(driver: str, others: dict[str, str] | None = None) -> tuple[Launcher, list[tuple[str, str]]]:
-        programs = others or dict.fromkeys(OTHERS, PATIENT)
-        commands = {
-            name: ([sys.executable, "-c", text, name, str(tmp_path)], STAGES[name]) for name, text in programs.items()
-        }
+        texts = others or dict.fromkeys(OTHERS, PATIENT)
+        programs = {name: program(tmp_path, text, STAGES[name], name, str(tmp_path)) for name, text in texts.items()}
         text = WHEN_ALL_ARE_READY + driver
-        commands["driver"] = ([sys.executable, "-c", text, str(tmp_path), ",".join(programs)], Stage.DRIVER)
-        monkeypatch.setattr(module, "commands", lambda plan: commands)
+        programs["driver"] = program(tmp_path, text, Stage.DRIVER, str(tmp_path), ",".join(texts))
+        monkeypatch.syspath_prepend(tmp_path)
+        monkeypatch.setattr(module, "programs", lambda plan: programs)
         config = RunConfig(path=tmp_path / "c.yaml", nodes=(NodeInstance(kind=NODE_KINDS["simulator"]),), parameters={})
         lines: list[tuple[str, str]] = []
         plan = RunPlan(config=config, directory=tmp_path / "run")
@@ -159,19 +166,20 @@ def test_node_that_does_not_end_is_killed_and_named(
 
 def test_nodes_end_when_the_launcher_is_killed(tmp_path: Path, wait_until: Any) -> None:
     """They get SIGINT, so that the recorder closes its bag."""
-    program = f"""
+    patient = program(tmp_path, PATIENT, Stage.DRIVER, "recorder", str(tmp_path))
+    code = f"""
 import sys
 from pathlib import Path
 from gbas_bringup import launcher as module
 from gbas_bringup.node_kinds import *
 from gbas_bringup.run_config import RunConfig
 folder = Path({str(tmp_path)!r})
-command = [sys.executable, "-c", {PATIENT!r}, "recorder", str(folder)]
-module.commands = lambda plan: {{"recorder": (command, Stage.DRIVER)}}
+sys.path.insert(0, str(folder))
+module.programs = lambda plan: {{"recorder": module.Program({patient.module!r}, {patient.arguments!r}, Stage.DRIVER)}}
 config = RunConfig(path=folder / "c.yaml", nodes=(NodeInstance(kind=NODE_KINDS["simulator"]),), parameters={{}})
 module.Launcher(module.RunPlan(config=config, directory=folder / "run")).run()
 """
-    process = subprocess.Popen([sys.executable, "-c", program])
+    process = subprocess.Popen([sys.executable, "-c", code])
     wait_until(lambda: (tmp_path / "recorder.ready").exists(), "the program to be ready")
     process.kill()
     process.wait()

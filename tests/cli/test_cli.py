@@ -75,6 +75,18 @@ def test_help_loads_nothing_that_computes() -> None:
     assert done.stdout.splitlines()[-1] == "[]"
 
 
+def test_output_nobody_reads_to_its_end_is_no_error() -> None:
+    """``gbas config schema | head``."""
+    command = [sys.executable, "-m", "gbas_cli.main", "config", "schema"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    assert process.stderr is not None
+    process.stdout.close()
+    with process.stderr as said:
+        assert said.read() == ""
+    assert process.wait() == 1
+
+
 def test_version() -> None:
     assert gbas("--version").stdout.startswith("gbas ")
 

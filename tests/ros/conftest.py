@@ -7,9 +7,6 @@ test that has gone wrong, they are never part of what is measured.
 from __future__ import annotations
 
 import os
-import signal
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -27,56 +24,11 @@ from std_msgs.msg import Float64MultiArray, String, UInt8MultiArray
 from gbas_msgs_py import ros, tables, topics
 from gbas_msgs_py.qos import DATA, qos_of
 from gbas_node.transport import use_profile
+from started_nodes import LoggedNode
 
 START_S = 60.0
 ANSWER_S = 3.0
 END_S = 30.0
-
-
-class Process:
-    """A node as a process."""
-
-    def __init__(self, module: str, arguments: list[str], environment: dict[str, str], log: Path) -> None:
-        self.module = module
-        self._log = log
-        with log.open("wb") as out:
-            self._popen = subprocess.Popen(
-                [sys.executable, "-m", module, *arguments],
-                stdin=subprocess.DEVNULL,
-                stdout=out,
-                stderr=subprocess.STDOUT,
-                env=environment,
-                start_new_session=True,
-            )
-
-    @property
-    def output(self) -> str:
-        return self._log.read_text(errors="replace")
-
-    @property
-    def running(self) -> bool:
-        return self._popen.poll() is None
-
-    def wait(self, timeout_s: float = END_S) -> int:
-        """Exit code; the process must end by itself."""
-        try:
-            return self._popen.wait(timeout_s)
-        except subprocess.TimeoutExpired:
-            pytest.fail(f"{self.module} did not end within {timeout_s} s\n{self.output}")
-
-    def send(self, number: int) -> None:
-        self._popen.send_signal(number)
-
-    def interrupt(self, timeout_s: float = END_S) -> int:
-        """Exit code after SIGINT."""
-        if self.running:
-            self.send(signal.SIGINT)
-        return self.wait(timeout_s)
-
-    def kill(self) -> None:
-        if self.running:
-            self._popen.kill()
-        self._popen.wait()
 
 
 class Launcher:
@@ -85,9 +37,11 @@ class Launcher:
     def __init__(self, folder: Path) -> None:
         self._environment = dict(os.environ)  # in which the fixture `domain` names it, and keeps it to this machine
         self._folder = folder
-        self.processes: list[Process] = []
+        self.processes: list[LoggedNode] = []
 
-    def start(self, module: str, parameters: dict[str, Any] | None = None, ros_args: tuple[str, ...] = ()) -> Process:
+    def start(
+        self, module: str, parameters: dict[str, Any] | None = None, ros_args: tuple[str, ...] = ()
+    ) -> LoggedNode:
         """Start ``python -m module`` with a parameter file that holds for whatever node it makes."""
         number = len(self.processes)
         arguments = ["--ros-args", *ros_args]
@@ -95,7 +49,7 @@ class Launcher:
             file = self._folder / f"{number}.yaml"
             file.write_text(yaml.safe_dump({"/**": {"ros__parameters": parameters}}))
             arguments += ["--params-file", str(file)]
-        process = Process(module, arguments, self._environment, self._folder / f"{number}_{module}.log")
+        process = LoggedNode(module, arguments, self._environment, self._folder / f"{number}_{module}.log")
         self.processes.append(process)
         return process
 
@@ -105,6 +59,7 @@ class Launcher:
     def end_all(self) -> None:
         for process in self.processes:
             process.kill()
+            process.wait()
 
 
 @pytest.fixture

@@ -213,7 +213,7 @@ def test_replay_says_who_stalls(launcher: Any, probe: Any, files: dict[str, Any]
     bursts = probe.bursts()
     replay = launcher.start(REPLAY, {**files, **readers})
     probe.until(lambda: len(bursts) > 20, "the replay under way")
-    monitor.send(signal.SIGKILL)
+    monitor.send_signal(signal.SIGKILL)
     assert replay.wait(60.0) == 3
     assert "no progress of correction_broadcast for 5 s" in replay.output
 
@@ -237,5 +237,5 @@ def test_replay_stops_in_order_in_the_middle(launcher: Any, probe: Any, files: d
         launcher.start(f"gbas_ground.nodes.{node}", {"ground": STATION, "start_wait_s": 60.0})
     replay = launcher.start(REPLAY, {**files, "user_file": "", "speed": 1.0, "start_wait_s": 60.0})
     probe.until(lambda: bursts, "the replay under way")
-    assert replay.interrupt() == 0
+    assert replay.end(signal.SIGINT)[0] == 0
     assert "Traceback" not in replay.output

@@ -143,7 +143,7 @@ def test_signal_publishes_what_is_pending_and_ends_in_order(launcher: Any, probe
         probe.send(topics.GROUND_OBSERVATIONS[0], tables.OBSERVATIONS, ObservationEpoch(gps_week=2300, tow_s=tow_s))
     probe.until(lambda: status.get("integrity_monitor", (0, "", {}))[2].get("epochs_waiting") == "2", "two epochs wait")
     assert integrity == []
-    process.send(number)
+    process.send_signal(number)
     assert process.wait() == 0, process.output
     probe.until(lambda: len(integrity) == 2, "the pending epochs")
     assert [each.tow_s for each in integrity] == [10.0, 10.5]
@@ -153,7 +153,9 @@ def test_signal_publishes_what_is_pending_and_ends_in_order(launcher: Any, probe
 
 def test_signal_during_the_start_ends_the_program(launcher: Any, probe: Any) -> None:
     process = launcher.start(PROTECTION)
-    process.interrupt()  # until the node has taken over, Python may end by the signal or by an interrupted import
+    process.end(
+        signal.SIGINT
+    )  # until the node has taken over, Python may end by the signal or by an interrupted import
     assert not process.running
 
 

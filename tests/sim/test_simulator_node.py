@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import time
 
 import numpy as np
@@ -13,6 +11,7 @@ import yaml
 rclpy = pytest.importorskip("rclpy")
 
 from bag_fixtures import isolated_domain  # noqa: E402
+from gbas_bringup.environment import process_environment  # noqa: E402
 from gbas_core.gnss.gpstime import epoch_key  # noqa: E402
 from gbas_core.gnss.observations import ObservationEpoch  # noqa: E402
 from gbas_msgs_py import tables, topics  # noqa: E402
@@ -20,6 +19,7 @@ from gbas_node.node import GbasNode  # noqa: E402
 from gbas_sim.nodes.simulator import Simulator  # noqa: E402
 from gbas_sim.scenario import scenario_from_mapping  # noqa: E402
 from gbas_sim.world import World  # noqa: E402
+from started_nodes import LoggedNode  # noqa: E402
 
 pytestmark = pytest.mark.ros
 
@@ -145,9 +145,10 @@ def test_bad_parameters_end_the_program_with_one_line(tmp_path, domain, argument
         file = tmp_path / "site.yaml"
         file.write_text(yaml.safe_dump(SITE))
         arguments = ["-p", f"config:={file}", *arguments]
-    command = [sys.executable, "-m", "gbas_sim.nodes.simulator", "--ros-args", *arguments]
-    ended = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
-    assert ended.returncode == 2
-    assert message in ended.stderr
-    assert len([line for line in ended.stderr.splitlines() if line.startswith("simulator:")]) == 1
-    assert "Traceback" not in ended.stderr
+    environment = process_environment(domain=domain, isolated=True)
+    node = LoggedNode("gbas_sim.nodes.simulator", ["--ros-args", *arguments], environment, tmp_path / "log")
+    code, output = node.end()
+    assert code == 2
+    assert message in output
+    assert len([line for line in output.splitlines() if line.startswith("simulator:")]) == 1
+    assert "Traceback" not in output

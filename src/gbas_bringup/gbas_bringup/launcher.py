@@ -8,22 +8,21 @@ of the data: driver, ground, aircraft, recorder; so nothing that was sent is lef
 from __future__ import annotations
 
 import contextlib
-import ctypes
+import os
 import signal
-import subprocess
-import sys
 import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO, Any, Final
+from typing import IO, Any, Final, NamedTuple
 
 import yaml
 
 from gbas_bringup.environment import process_environment
 from gbas_bringup.node_kinds import NodeInstance, Stage
+from gbas_bringup.node_process import NodeProcess
 from gbas_bringup.run_config import RunConfig, one_driver
 from gbas_core.errors import EXIT_BAD_INPUT, EXIT_INTERRUPTED, GbasError, NodeDied
 
@@ -42,7 +41,7 @@ _STOP_S: Final[Mapping[Stage, float]] = {
     Stage.RECORDER: 20.0,
 }
 _TERMINATE_S: Final = 3.0
-_PR_SET_PDEATHSIG: Final = 1
+_ALL_IN_ONE: Final = "gbas_bringup.single_process"
 
 Echo = Callable[[str, str], None]
 
@@ -161,15 +160,21 @@ def node_arguments(plan: RunPlan, node: NodeInstance | None) -> list[str]:
     return arguments
 
 
-def commands(plan: RunPlan) -> dict[str, tuple[list[str], Stage]]:
-    """Command line and stage of each process, by label."""
+class Program(NamedTuple):
+    """A process to start: a module with a function ``main``, its arguments, and its stage."""
+
+    module: str
+    arguments: Sequence[str]
+    stage: Stage
+
+
+def programs(plan: RunPlan) -> dict[str, Program]:
+    """The processes of a run, by label."""
     if plan.single_process:
         names = [node.full_name for node in plan.config.nodes]
-        module = [sys.executable, "-m", "gbas_bringup.single_process"]
-        return {"nodes": ([*module, *names, *node_arguments(plan, None)], Stage.DRIVER)}
+        return {"nodes": Program(_ALL_IN_ONE, [*names, *node_arguments(plan, None)], Stage.DRIVER)}
     return {
-        node.label: ([sys.executable, "-m", node.kind.module, *node_arguments(plan, node)], node.kind.stage)
-        for node in plan.config.nodes
+        node.label: Program(node.kind.module, node_arguments(plan, node), node.kind.stage) for node in plan.config.nodes
     }
 
 
@@ -179,20 +184,13 @@ class _Running:
 
     label: str
     stage: Stage
-    process: subprocess.Popen[str]
+    process: NodeProcess
+    output: IO[str]
     lines: deque[str] = field(default_factory=lambda: deque(maxlen=_LAST_LINES))
     reader: threading.Thread | None = None
 
-    def signal(self, number: signal.Signals) -> None:
-        with contextlib.suppress(ProcessLookupError):
-            self.process.send_signal(number)
-
     def wait_until(self, deadline_s: float) -> bool:
-        try:
-            self.process.wait(timeout=max(0.0, deadline_s - time.monotonic()))
-        except subprocess.TimeoutExpired:
-            return False
-        return True
+        return self.process.wait(max(0.0, deadline_s - time.monotonic())) is not None
 
 
 class Launcher:
@@ -253,30 +251,24 @@ class Launcher:
         environment = process_environment(
             domain=plan.domain, isolated=plan.isolated, log_dir=plan.directory.resolve() / "log"
         )
-        for label, (command, stage) in commands(plan).items():
-            process = subprocess.Popen(
-                command,
-                env=environment,
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.STDOUT,
-                text=True,
-                errors="replace",
-                start_new_session=True,
-                preexec_fn=_end_with_parent,
-            )
-            self._running.append(_Running(label, stage, process))
+        for label, program in programs(plan).items():
+            ours, theirs = os.pipe()
+            output = open(ours, errors="replace")  # noqa: SIM115
+            try:
+                process = NodeProcess(program.module, program.arguments, environment, theirs)
+            finally:
+                os.close(theirs)
+            self._running.append(_Running(label, program.stage, process, output))
         for running in self._running:
             running.reader = threading.Thread(target=self._read, args=(running,), name=running.label, daemon=True)
             running.reader.start()
 
     def _read(self, running: _Running) -> None:
-        stream: IO[str] | None = running.process.stdout
-        assert stream is not None
-        for line in stream:
-            running.lines.append(line.rstrip())
-            if self._echo is not None:
-                self._echo(running.label, line.rstrip())
+        with running.output:
+            for line in running.output:
+                running.lines.append(line.rstrip())
+                if self._echo is not None:
+                    self._echo(running.label, line.rstrip())
 
     def _watch(self) -> None:
         while True:
@@ -310,7 +302,7 @@ class Launcher:
         for stage in Stage:
             group = [each for each in self._running if each.stage is stage and each.process.poll() is None]
             for each in group:
-                each.signal(signal.SIGINT)
+                each.process.send_signal(signal.SIGINT)
             deadline_s = time.monotonic() + _STOP_S[stage]
             for each in group:
                 if not self._ends(each, deadline_s):
@@ -325,7 +317,7 @@ class Launcher:
         while self._signals < 2 and time.monotonic() < deadline_s:
             if running.wait_until(min(deadline_s, time.monotonic() + _POLL_S)):
                 return True
-        running.signal(signal.SIGTERM)
+        running.process.send_signal(signal.SIGTERM)
         if not running.wait_until(time.monotonic() + (_TERMINATE_S if self._signals < 2 else 0.5)):
             running.process.kill()
             running.process.wait()
@@ -346,9 +338,3 @@ class Launcher:
         finally:
             for number, handler in before.items():
                 signal.signal(number, handler)
-
-
-def _end_with_parent() -> None:
-    """In the child: get SIGINT when the launcher is killed, so that no node is left behind and the bag is closed."""
-    with contextlib.suppress(OSError, AttributeError):
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGINT)
