@@ -15,13 +15,14 @@ from rclpy.serialization import serialize_message
 
 from gbas_bags.mcap_log import BagWriter, Topic
 from gbas_bench import monitors
-from gbas_bench.bench import PARTS, print_report, run_bench
+from gbas_bench.bench import PARTS, print_changes, print_report, run_bench
 from gbas_bench.figures import Figure, Part, document, environment
+from gbas_bench.history import changes, mean_ratio, other_machine, read_report
 from gbas_bench.live import _settled, read_arrivals
 from gbas_bench.offline import SETTLE_EPOCHS, make_flight, measure_steps
 from gbas_bench.peer import measure_process
 from gbas_bench.world import SATELLITES_A_SYSTEM, bench_world
-from gbas_core.errors import GbasError
+from gbas_core.errors import ConfigError, GbasError
 from gbas_core.gnss.gpstime import epoch_key
 from gbas_core.gnss.observations import ObservationEpoch
 from gbas_core.satellites import IS_GPS
@@ -125,6 +126,33 @@ def test_the_report_names_machine_figures_and_what_was_left_out(capsys):
     assert "4" in shown
     assert "no data" in shown
     assert report["parts"][0]["figures"][0]["ratio"] == 4.0
+
+
+def test_figures_are_set_against_those_of_an_earlier_report(tmp_path, capsys):
+    def report(time_ms, speed, commit):
+        figures = (figure(value=time_ms), figure(name="m", value=speed, unit="x", better="more"))
+        parts = [Part(name="p", about="a", figures=figures), Part(name="q", about="a", skipped="no data")]
+        return json.loads(json.dumps(document({**environment(), "commit": commit}, parts)))
+
+    (tmp_path / "bench.json").write_text(json.dumps(report(8.0, 10.0, "abc1234")))
+    before, now = read_report(tmp_path / "bench.json"), report(2.0, 10.0, "def5678")
+    assert [each.ratio for each in changes(now, before)] == [4.0, 1.0]
+    assert mean_ratio(changes(now, before)) == pytest.approx(2.0)
+    assert other_machine(now, before) == ()
+    print_changes(now, {**before, "environment": {**before["environment"], "cores": 999}})
+    shown = capsys.readouterr().out
+    assert "against abc1234" in shown
+    assert "another machine" in shown
+    assert "cores 999" in shown
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"parts": [{"part": "p", "figures": [{"value": 0}]}]}'])
+def test_other_files_are_no_reports(tmp_path, text):
+    (tmp_path / "other.json").write_text(text)
+    with pytest.raises(ConfigError, match=r"other.json: is not a report of gbas bench"):
+        read_report(tmp_path / "other.json")
+    with pytest.raises(ConfigError, match="nowhere.json: cannot be read: No such file"):
+        read_report(tmp_path / "nowhere.json")
 
 
 @pytest.mark.campaign

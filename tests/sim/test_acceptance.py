@@ -569,6 +569,7 @@ def test_files_based_on_others(tmp_path):
 # --- long runs
 
 
+@pytest.mark.campaign
 def test_a_day_takes_no_more_memory_than_an_hour():
     """Allocations after 300 epochs and after as many more, spread over the day; less than 1 MB is kept between."""
     path = next(path for path in SCENARIOS if path.stem == "station_day")

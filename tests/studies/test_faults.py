@@ -94,6 +94,7 @@ def test_without_a_fault_nothing_happens(settled):
     assert reaction.others == ()
 
 
+@pytest.mark.campaign
 def test_one_process_and_two_find_the_same(world, station):
     cases = [case for case in cases_of(("acceleration",)) if case.name in ("step 0.5 m", "ramp 0.2 m/s")]
     setting = Setting(world=world, station=station)

@@ -34,6 +34,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from gbas_bench.figures import Part, document, environment
+from gbas_bench.history import changes, mean_ratio, other_machine, read_report
 from gbas_bringup.resources import data_folder
 from gbas_core.errors import GbasError
 
@@ -158,6 +159,28 @@ def print_report(result: Mapping[str, Any]) -> None:
     console.print("ratio: how many times better than what it is compared with; 1 or more meets a bound")
 
 
+def print_changes(now: Mapping[str, Any], before: Mapping[str, Any]) -> None:
+    """How much better each figure is than in an earlier report."""
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console(width=None if sys.stdout.isatty() else 130, highlight=False)
+    old, found = before["environment"], changes(now, before)
+    console.print(
+        f"\nagainst {old.get('commit') or old['suite_version']}, load {old['load_before']} before it", soft_wrap=True
+    )
+    for difference in other_machine(now, before):
+        console.print(f"another machine, so the ratios say little: {difference}", soft_wrap=True)
+    table = Table("part", "what", "before", "now", "times better", box=None, pad_edge=False)
+    for column in table.columns[2:]:
+        column.justify = "right"
+    for each in found:
+        was, value = (f"{_short(number)} {each.unit}" for number in (each.before, each.now))
+        table.add_row(each.part, each.name, was, value, _short(each.ratio))
+    console.print(table)
+    console.print(f"{len(found)} figures in both; {_short(mean_ratio(found))} times better in the geometric mean")
+
+
 def _short(value: float) -> str:
     """Three digits, without an exponent."""
     return f"{value:.0f}" if abs(value) >= 100.0 else f"{value:.3g}"
@@ -173,9 +196,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--seconds", type=float, help=f"duration of the latency run (default {LATENCY_S:g})")
     parser.add_argument("--data", type=Path, help="folder of recorded data (default: GBAS_DATA)")
     parser.add_argument("--out", type=Path, required=True, help="folder for bags and bench.json")
+    parser.add_argument("--against", type=Path, help="an earlier bench.json: print how much better each figure is")
     parser.add_argument("--json", action="store_true", help="print JSON only")
     given = parser.parse_args(arguments)
     try:
+        before = None if given.against is None else read_report(given.against)
         result = run_bench(
             given.out,
             parts=given.part or PARTS,
@@ -189,8 +214,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return error.exit_code
     if given.json:
         print(json.dumps(result, indent=2, allow_nan=False))
-    else:
-        print_report(result)
+        return 0
+    print_report(result)
+    if before is not None:
+        print_changes(result, before)
     return 0
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+import subprocess
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -99,6 +100,7 @@ def environment() -> dict[str, Any]:
     """The machine and its load, without which no figure means anything."""
     return {
         "suite_version": __version__,
+        "commit": _commit(),
         "cores": len(os.sched_getaffinity(0)),
         "processor": _processor(),
         "system": f"{platform.system()} {platform.release()}",
@@ -115,6 +117,15 @@ def document(about: Mapping[str, Any], parts: Sequence[Part]) -> dict[str, Any]:
         "environment": {**about, "load_after": round(os.getloadavg()[0], 2)},
         "parts": [part.as_json() for part in parts],
     }
+
+
+def _commit() -> str:
+    """The checkout's commit, marked when something in it has changed; empty for an installed suite."""
+    command = ["git", "-C", str(Path(__file__).parent), "describe", "--always", "--dirty", "--exclude=*"]
+    try:
+        return subprocess.run(command, capture_output=True, text=True, check=True, timeout=10.0).stdout.strip()
+    except (OSError, subprocess.SubprocessError):
+        return ""
 
 
 def _processor() -> str:

@@ -324,6 +324,9 @@ def bench(
     quick: Annotated[bool, typer.Option("--quick", help="Short runs: less exact.")] = False,
     seconds: Annotated[float | None, typer.Option(help="Duration of the latency run (default: 40).")] = None,
     data: Annotated[Path | None, typer.Option(help="Folder of recorded data (default: GBAS_DATA).")] = None,
+    against: Annotated[
+        Path | None, typer.Option(help="An earlier bench.json: also print how much better each figure has become.")
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for what is written (default: out/bench-N).")] = None,
     as_json: Json = False,
 ) -> None:
@@ -334,8 +337,10 @@ def bench(
     1 or more meets a bound. Wall times hold for this machine with all that runs on it: see the load in the header.
     """
     from gbas_bench import bench as body
+    from gbas_bench.history import read_report
     from gbas_bringup.progress import progress
 
+    before = None if against is None else read_report(against)
     folder = new_out(out, "bench")
     with progress("measuring", enabled=not as_json) as update:
         result = body.run_bench(
@@ -350,6 +355,8 @@ def bench(
         print_json(result)
         return
     body.print_report(result)
+    if before is not None:
+        body.print_changes(result, before)
     print_places({"report": folder / "bench.json"})
 
 

@@ -304,9 +304,18 @@ def test_curved_approach_is_an_arc_over_the_ground_in_wind() -> None:
     assert -6000.0 - edge_m < 0.5 * solution[0] < -6000.0
 
 
-@pytest.mark.parametrize("ends", [{"start": START}, {"approach": APPROACH}], ids=["from a start", "onto an approach"])
-def test_five_phases_of_five_minutes(ends) -> None:
-    flight = Flight(plan=five_phase_plan(**ends), aircraft=FIGHTER)
+@pytest.mark.parametrize(
+    "flight",
+    [
+        FLIGHTS["fighter, five phases"],
+        pytest.param(
+            Flight(plan=five_phase_plan(approach=APPROACH), aircraft=FIGHTER),
+            marks=pytest.mark.campaign,
+        ),
+    ],
+    ids=["from a start", "onto an approach"],
+)
+def test_five_phases_of_five_minutes(flight: Flight) -> None:
     # papers/abia.txt, section V; the turn is from 600 to 900 s.
     assert flight.duration_s == 1500.0
     np.testing.assert_allclose([phase.start_s for phase in flight.phases], [0, 300, 600, 900, 1200], atol=1e-6)
@@ -430,7 +439,7 @@ def test_across_the_date_line() -> None:
     speeds=st.tuples(st.floats(90.0, 120.0), st.floats(90.0, 120.0)),
     onto=st.booleans(),
 )
-@settings(max_examples=8)
+@settings(max_examples=4)
 def test_plans_are_continuous_whatever_they_are_made_of(turns, gain, speeds, onto) -> None:
     segments = [
         Climb(height_gain_m=gain, vertical_speed_mps=6.0, speed_mps=speeds[0]),
