@@ -27,12 +27,12 @@ from recorded_sets import request as request_of
 START_S = 245.0
 
 
-SHORT = 1500
-"""Epochs of the long recordings that every run looks at: 25 minutes of an hour; the whole is a campaign."""
+SHORT = 1200
+"""Epochs of the long recordings that every run looks at: 20 minutes of an hour; the whole is a campaign."""
 
 
 @pytest.fixture(
-    scope="module", params=[SHORT, pytest.param(None, marks=pytest.mark.campaign)], ids=["25 minutes", "whole"]
+    scope="module", params=[SHORT, pytest.param(None, marks=pytest.mark.campaign)], ids=["20 minutes", "whole"]
 )
 def results(data_dir: Path, request: pytest.FixtureRequest) -> dict[str, ProcessResult]:
     """Every set processed once."""

@@ -381,10 +381,10 @@ MOSAIC = "static_pair_L1L5_2024/base.obs.gz"
 def recorded(path):
     file = read_observations(path)
     return SimpleNamespace(
-        code=file.code_m[:, None],
-        carrier=file.carrier_m[:, None],
-        doppler=file.doppler_hz[:, None],
-        lli=file.lli[:, None],
+        code=file.code_m[:, None].copy(),  # as messages are: compiled loops have another form for what is read-only
+        carrier=file.carrier_m[:, None].copy(),
+        doppler=file.doppler_hz[:, None].copy(),
+        lli=file.lli[:, None].copy(),
         dt_s=1.0,
     )
 

@@ -47,7 +47,7 @@ def run(values, *, params=PARAMS, restarted=None, due=None, dt_s=None, shift=Non
     state, results = initial_carrier_acceleration(receivers, params), []
     for number in range(n_epochs):
         interval = np.nan if number == 0 else (T if dt_s is None else dt_s[number])
-        wanted = np.broadcast_to(HERE, (receivers, N_SATS)) if due is None else due
+        wanted = np.tile(HERE, (receivers, 1)) if due is None else due
         late = wanted if number >= params.least_points - 1 else np.zeros_like(wanted)
         slips = NEVER[:receivers] if restarted is None else restarted[number]
         seen = Carriers(values[number], slips, late, ELEVATION, None if shift is None else shift[number])
@@ -270,7 +270,7 @@ def test_recorded_pairs_have_no_false_alarm(data_dir, name, bands):
         residual = carrier_residual_m(epoch.carrier_m, epoch.range_m, epoch.clock_s, delay, bands)
         dt = np.nan if before is None else (epoch.key - before) / 1000.0
         before = epoch.key
-        restarted = epoch.restarted[:, list(bands)]
+        restarted = np.ascontiguousarray(epoch.restarted[:, list(bands)])
         due = np.zeros((2, N_SATS), dtype=bool)
         seen = Carriers(residual, restarted, due, epoch.elevation_rad, epoch.shift_m)
         state, result = carrier_acceleration_step(state, seen, dt, params)

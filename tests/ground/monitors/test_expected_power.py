@@ -22,7 +22,7 @@ from monitor_scenes import STATION, recorded_pair
 PARAMS = STATION.expected_power_monitor()
 HERE = np.isin(np.arange(N_SATS), [0, 3, 5, 9, 12, 17, 33, 37, 40, 45, 60])
 ELEVATION = np.where(HERE, np.radians(6.0 + 1.3 * np.arange(N_SATS)), np.nan)
-DUE = np.broadcast_to(HERE, (4, N_SATS))
+DUE = np.broadcast_to(HERE, (4, N_SATS)).copy()
 
 
 def run(values, *, params=PARAMS, dt_s=None, due=DUE, state=None):

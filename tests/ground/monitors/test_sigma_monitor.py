@@ -28,7 +28,7 @@ STEP_S = 50.0
 
 
 def due(receivers=4):
-    return np.broadcast_to(HERE, (receivers, N_SATS))
+    return np.broadcast_to(HERE, (receivers, N_SATS)).copy()
 
 
 def run(values, *, params=PARAMS, dt_s=STEP_S, wanted=None):

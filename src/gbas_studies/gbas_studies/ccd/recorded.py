@@ -274,7 +274,7 @@ class Observer:
         returned = present & ~self._present
         self._present = present
         high = np.where(np.isfinite(predicted.elevation_rad), predicted.elevation_rad >= MASK_RAD, True)
-        used = np.broadcast_to(high, raw.code_m[:, 0].shape)
+        used = np.broadcast_to(high, raw.code_m[:, 0].shape).copy()
         return TwoFrequencyInput(
             code_m=raw.code_m,
             carrier_m=found.carrier_m,
