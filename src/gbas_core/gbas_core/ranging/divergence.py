@@ -26,6 +26,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from gbas_core.compiled import as_written
+from gbas_core.ranging.kernels.divergence import cascaded
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import N_SATS
 
@@ -203,10 +205,8 @@ def _advanced(
     empty = starting | ~np.isfinite(age_s)
     alpha = np.where(going, np.minimum(since_s / params.tau_s, 1.0), 0.0)
     rate = np.where(going, rate_mps, 0.0)
-    f1 = np.where(empty, 0.0, state.f1_mps)
-    f1 = f1 + alpha * (rate - f1)
-    f2 = np.where(empty, 0.0, state.f2_mps)
-    f2 = f2 + alpha * (f1 - f2)
+    f1, f2 = (np.where(empty, 0.0, before) for before in (state.f1_mps, state.f2_mps))
+    f1, f2 = as_written(cascaded)(f1, f2, rate, alpha)
     measured = going | starting
     new = {
         "f1_mps": f1,

@@ -11,21 +11,12 @@ from typing import Final
 import numpy as np
 
 from gbas_core.compiled import compiled
+from gbas_core.ranging.kernels.divergence import cascaded
 from gbas_core.record import FloatArray
 from gbas_core.satellites import N_SATS
 
 VALUE, F1, F2, SINCE, AGE = range(5)
 N_MEMORY: Final = 5
-
-
-@compiled
-def cascaded(f1, f2, rate, alpha):
-    """Both filters one epoch later: ``F1 = (1 - a) F1 + a r`` and ``F2 = (1 - a) F2 + a F1``.
-
-    Source: Jiang, Milner, Macabiau, ENC 2015, eq (3) and (4).
-    """
-    f1 = f1 + alpha * (rate - f1)
-    return f1, f2 + alpha * (f1 - f2)
 
 
 @compiled
