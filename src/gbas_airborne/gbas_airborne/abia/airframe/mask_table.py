@@ -91,6 +91,4 @@ def body_direction(azimuth_rad: ArrayLike, elevation_rad: ArrayLike) -> FloatArr
     """Unit vectors ``(..., 3)``, forward, right, down, of directions ``(...)`` in the body frame."""
     azimuth, elevation = np.asarray(azimuth_rad, dtype=np.float64), np.asarray(elevation_rad, dtype=np.float64)
     level = np.cos(elevation)
-    return np.stack(
-        np.broadcast_arrays(level * np.cos(azimuth), level * np.sin(azimuth), -np.sin(elevation)), axis=-1
-    )
+    return np.stack(np.broadcast_arrays(level * np.cos(azimuth), level * np.sin(azimuth), -np.sin(elevation)), axis=-1)
