@@ -1,0 +1,1 @@
+"""Avionics based augmentation: its pictures and figures."""
