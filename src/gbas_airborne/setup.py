@@ -22,6 +22,7 @@ setup(
         "gbas_msgs_py",
         "gbas_node",
         "embreex",
+        "imagecodecs",
         "numpy",
         "PyYAML",
         "tifffile",

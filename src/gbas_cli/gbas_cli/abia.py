@@ -189,11 +189,13 @@ def mask(
         str, typer.Option(metavar="LETTERS", help="What the mesh's x, y, z point to: f b, l r, u d.")
     ] = "flu",
     scale_m: Annotated[float, typer.Option(metavar="M", help="Metres a unit of the file.")] = 1.0,
+    open_mesh: Annotated[bool, typer.Option("--open-mesh", help="Take a mesh with holes as it is.")] = False,
     as_json: Json = False,
 ) -> None:
     """Draw what an airframe hides from an antenna on it.
 
-    Axes are forward, left, up (flu) unless told otherwise. The mesh must be closed and the antenna outside of it.
+    Axes are forward, left, up (flu) unless told otherwise. The mesh must be closed and the antenna outside of it; with
+    --open-mesh rays pass through its holes.
     """
     from gbas_airborne.abia.airframe.mask_table import MaskTable, share_unlike_rays
     from gbas_studies.abia.mask_figure import mask_figure
@@ -202,7 +204,7 @@ def mask(
     check("--looks", looks, looks in (None, "up", "down"), "up or down")
     if out is not None:
         check("--out", out, out.suffix.lower() in (".png", ".svg", ".pdf"), "a .png, .svg or .pdf file")
-    airframe, placed = _mounted(mesh, antenna, looks, axes, scale_m)
+    airframe, placed = _mounted(mesh, antenna, looks, axes=axes, scale_m=scale_m, closed=not open_mesh)
     table = MaskTable.of_mesh(airframe, placed.place_m, horizon_rad=math.radians(horizon_deg), axis=placed.axis)
     unlike = share_unlike_rays(table, airframe, placed.place_m)
     picture = out or new_out(None, "mask") / "mask.png"
@@ -211,6 +213,7 @@ def mask(
     document = {
         "mesh": airframe.name,
         "triangles": len(airframe.faces),
+        "checked_for_holes": airframe.closed,
         "antenna_forward_right_down_m": list(placed.place_m),
         "horizon_deg": horizon_deg,
         "hidden_percent": 100.0 * table.blocked_share(),
@@ -222,13 +225,17 @@ def mask(
         print_json(document)
         return
     print(f"{airframe.name}: {len(airframe.faces)} triangles")
+    if not airframe.closed:
+        print("the mesh was not checked for holes: what is behind one counts as seen")
     print(f"hidden by the airframe      {document['hidden_percent']:.3f} % of the antenna's hemisphere")
     print(f"of what is above {horizon_deg:g} deg    {document['hidden_above_horizon_percent']:.3f} %")
     print(f"table against direct rays   {document['table_unlike_rays_percent']:.3f} % of 65536 directions differ")
     print_places({"picture": picture})
 
 
-def _mounted(mesh: str, antenna: str, looks: str | None, axes: str, scale_m: float) -> tuple[Airframe, Antenna]:
+def _mounted(
+    mesh: str, antenna: str, looks: str | None, *, axes: str, scale_m: float, closed: bool
+) -> tuple[Airframe, Antenna]:
     """An airframe, ours or from a file, and an antenna on it."""
     from gbas_airborne.abia.airframe.aircraft import AIRCRAFT, BODY_DOWN, Antenna, aircraft_of
     from gbas_airborne.abia.airframe.mask_table import BODY_UP
@@ -236,7 +243,7 @@ def _mounted(mesh: str, antenna: str, looks: str | None, axes: str, scale_m: flo
 
     turn = axes_of(axes)
     named = mesh in AIRCRAFT
-    airframe = aircraft_of(mesh).airframe if named else read_airframe(mesh, axes=axes, scale_m=scale_m)
+    airframe = aircraft_of(mesh).airframe if named else read_airframe(mesh, axes=axes, scale_m=scale_m, closed=closed)
     axis = {"up": BODY_UP, "down": BODY_DOWN, None: None}[looks]
     if named and "," not in antenna:
         known = aircraft_of(mesh).antenna(antenna)

@@ -26,7 +26,9 @@ def mask_figure(table: MaskTable, mesh: Airframe, antenna_m: tuple[float, float,
     figure = new_figure(2, 2, width=9.0, height=7.6, height_ratios=(1.3, 1.0))
     sky, unused, above, side = figure.axes
     unused.remove()
-    sky.set_subplotspec(figure.axes[0].get_gridspec()[0, :])
+    grid = sky.get_gridspec()
+    assert grid is not None
+    sky.set_subplotspec(grid[0, :])
     _draw_sky(sky, table)
     from_above = mesh.corners_m[:, :, [1, 0]]
     from_right = mesh.corners_m[:, :, [0, 2]] * [1.0, -1.0]

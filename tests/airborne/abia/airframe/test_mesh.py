@@ -125,3 +125,16 @@ def test_wall_to_the_right_hides_what_is_behind_it():
     assert table.masked(math.radians(90.0), 0.0)
     assert not table.masked(math.radians(270.0), 0.0)
     assert share_unlike_rays(table, wall, place) < 0.003
+
+
+def test_recorded_mesh_with_holes(data_dir):
+    """An aeroplane off the web, open at 224 edges: refused, or taken as it is on demand."""
+    path = data_dir / "terrain_mesh" / "airplane_pyvista.ply"
+    with pytest.raises(AirframeError, match="the mesh has holes: 224 of"):
+        read_airframe(path, scale_m=0.01)
+    body = read_airframe(path, scale_m=0.01, closed=False)
+    assert len(body.faces) == 2452
+    above, within = (7.0, -6.76, -1.5), (7.0, -6.76, -0.2)
+    with pytest.raises(AirframeError, match="inside the body"):
+        MaskTable.of_mesh(body, within)
+    assert share_unlike_rays(MaskTable.of_mesh(body, above), body, above) < 0.003

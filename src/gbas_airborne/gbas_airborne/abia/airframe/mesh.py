@@ -43,6 +43,9 @@ class Airframe:
         Forward, right, down [m].
     faces : (F, 3) array
         Corners of the triangles, counter-clockwise seen from outside.
+    closed : bool
+        False admits a mesh with holes, or with triangles that face both ways. Then rays may pass through the holes, and
+        an antenna counts as inside if hardly any ray leaves it.
 
     Raises
     ------
@@ -53,6 +56,7 @@ class Airframe:
     name: str
     vertices_m: FloatArray
     faces: IntArray
+    closed: bool = True
 
     def __post_init__(self) -> None:
         vertices, faces = self.vertices_m, self.faces
@@ -67,11 +71,10 @@ class Airframe:
             raise AirframeError(
                 f"{self.name}: the mesh is {size_m:.4g} m across: must be {_SMALLEST_M:g} to {_LARGEST_M:g} m (units?)"
             )
-        self._refuse_holes()
-        if not self.volume_m3 > 0.0:
-            raise AirframeError(f"{self.name}: the mesh has no inside: its volume is {self.volume_m3:.3g} m^3")
+        if self.closed:
+            self._refuse_open()
 
-    def _refuse_holes(self) -> None:
+    def _refuse_open(self) -> None:
         """Each edge must be in as many triangles one way as the other."""
         ends = self.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
         one_way = ends[:, 0] < ends[:, 1]
@@ -82,6 +85,8 @@ class Airframe:
         forward = np.bincount(edge, weights=one_way)
         if (turned := int((2.0 * forward != uses).sum())) > 0:
             raise AirframeError(f"{self.name}: triangles face both ways: at {turned} of {len(uses)} edges")
+        if not self.volume_m3 > 0.0:
+            raise AirframeError(f"{self.name}: the mesh has no inside: its volume is {self.volume_m3:.3g} m^3")
 
     @cached_property
     def corners_m(self) -> FloatArray:
@@ -100,17 +105,21 @@ class Airframe:
         return sha256(np.ascontiguousarray(self.corners_m).tobytes()).hexdigest()
 
     @classmethod
-    def outward(cls, name: str, vertices_m: FloatArray, faces: IntArray) -> Airframe:
-        """The same, turned inside out if all triangles face inwards."""
+    def outward(cls, name: str, vertices_m: FloatArray, faces: IntArray, *, closed: bool = True) -> Airframe:
+        """The same, turned inside out if the triangles face inwards."""
         first, second, third = np.moveaxis(vertices_m[faces], 1, 0)
         inward = bool(np.einsum("ij,ij->", first, np.cross(second, third)) < 0.0)
-        return cls(name=name, vertices_m=vertices_m, faces=faces[:, ::-1] if inward else faces)
+        return cls(name=name, vertices_m=vertices_m, faces=faces[:, ::-1] if inward else faces, closed=closed)
 
     def inside(self, place_m: ArrayLike) -> bool:
         """Whether a place is inside any of the bodies: the solid angle that all triangles fill, seen from it.
 
+        Of a mesh that is not closed: whether less than a tenth of all rays leaves it.
+
         Source: van Oosterom and Strackee, "The solid angle of a plane triangle", IEEE Trans. Biomed. Eng. 30 (1983).
         """
+        if not self.closed:
+            return bool(self.stops(place_m, _EVERY_WAY).mean() > 0.9)
         towards = self.corners_m - np.asarray(place_m, dtype=np.float64)
         length = np.linalg.norm(towards, axis=-1)
         one, two, three = np.moveaxis(towards, 1, 0)
@@ -152,8 +161,8 @@ class Airframe:
 
     def _scene(self, place_m: tuple[float, ...]) -> Any:
         """Embree's search tree of the mesh about a place; the last few are kept."""
-        from embreex.mesh_construction import TriangleMesh
-        from embreex.rtcore_scene import EmbreeScene
+        from embreex.mesh_construction import TriangleMesh  # type: ignore[import-untyped]
+        from embreex.rtcore_scene import EmbreeScene  # type: ignore[import-untyped]
 
         if place_m not in self._scenes:
             if len(self._scenes) >= _SCENES:
@@ -168,7 +177,16 @@ class Airframe:
         return {}
 
 
+def _spread(count: int) -> FloatArray:
+    """Directions evenly over the sphere, (count, 3): a spiral by the golden angle."""
+    down = 1.0 - (2.0 * np.arange(count) + 1.0) / count
+    turn = np.arange(count) * (np.pi * (3.0 - np.sqrt(5.0)))
+    level = np.sqrt(1.0 - down**2)
+    return np.stack([level * np.cos(turn), level * np.sin(turn), down], axis=1)
+
+
 _SCENES: Final = 4
+_EVERY_WAY: Final = _spread(4000)
 
 
 def _distance_to_triangles(place: FloatArray, corners: FloatArray) -> FloatArray:
@@ -211,10 +229,10 @@ def axes_of(axes: str) -> FloatArray:
     good = len(axes) == 3 and all(any(each in sense for each in axes) for sense in _SENSES)
     if not good or not set(axes) <= set(_AXES):
         raise AirframeError(f"axes = {axes!r} is not three letters, one of f b, one of l r, one of u d")
-    return np.array([_AXES[each] for each in axes]).T
+    return np.array([_AXES[each] for each in axes], dtype=np.float64).T
 
 
-def read_airframe(path: Path | str, *, axes: str = "flu", scale_m: float = 1.0) -> Airframe:
+def read_airframe(path: Path | str, *, axes: str = "flu", scale_m: float = 1.0, closed: bool = True) -> Airframe:
     """A mesh from a file: STL, OBJ, PLY or GLB.
 
     Parameters
@@ -224,6 +242,8 @@ def read_airframe(path: Path | str, *, axes: str = "flu", scale_m: float = 1.0) 
         See :func:`axes_of`.
     scale_m : float
         Metres a unit of the file.
+    closed : bool
+        See :class:`Airframe`.
 
     Raises
     ------
@@ -245,7 +265,7 @@ def read_airframe(path: Path | str, *, axes: str = "flu", scale_m: float = 1.0) 
     except Exception as error:  # trimesh and its readers raise whatever they meet
         raise AirframeError(f"{path}: cannot be read as a mesh: {' '.join(str(error).split())}") from None
     vertices, faces = _without_slivers(scale_m * vertices @ axes_of(axes).T, faces)
-    return Airframe.outward(path.name, vertices, faces)
+    return Airframe.outward(path.name, vertices, faces, closed=closed)
 
 
 def _without_slivers(vertices_m: FloatArray, faces: NDArray[np.int64]) -> tuple[FloatArray, NDArray[np.int64]]:
