@@ -163,8 +163,8 @@ def _at_edges(blocked: BoolArray) -> BoolArray:
 
 def _centres(columns: int, rows: int) -> tuple[FloatArray, FloatArray]:
     """Azimuths (A, 1) and elevations (1, E) of the centres of cells [rad]."""
-    azimuth: FloatArray = (np.arange(columns) + 0.5) * (2.0 * math.pi / columns)
-    elevation: FloatArray = (np.arange(rows) + 0.5) * (math.pi / rows) - 0.5 * math.pi
+    azimuth: FloatArray = (np.arange(columns, dtype=np.float64) + 0.5) * (2.0 * math.pi / columns)
+    elevation: FloatArray = (np.arange(rows, dtype=np.float64) + 0.5) * (math.pi / rows) - 0.5 * math.pi
     return azimuth[:, np.newaxis], elevation[np.newaxis, :]
 
 

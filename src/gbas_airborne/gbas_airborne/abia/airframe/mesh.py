@@ -229,7 +229,8 @@ def axes_of(axes: str) -> FloatArray:
     good = len(axes) == 3 and all(any(each in sense for each in axes) for sense in _SENSES)
     if not good or not set(axes) <= set(_AXES):
         raise AirframeError(f"axes = {axes!r} is not three letters, one of f b, one of l r, one of u d")
-    return np.array([_AXES[each] for each in axes], dtype=np.float64).T
+    rotation: FloatArray = np.array([_AXES[each] for each in axes], dtype=np.float64).T
+    return rotation
 
 
 def read_airframe(path: Path | str, *, axes: str = "flu", scale_m: float = 1.0, closed: bool = True) -> Airframe:

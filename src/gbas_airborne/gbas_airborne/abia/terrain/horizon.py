@@ -78,7 +78,7 @@ def terrain_horizon(tile: ElevationTile, lat_rad: float, lon_rad: float, height_
         For a place the tile does not cover.
     """
     tile.refuse_path(np.array([lat_rad]), np.array([lon_rad]))
-    azimuth = np.arange(_AZIMUTHS) * (2.0 * math.pi / _AZIMUTHS)
+    azimuth: FloatArray = np.arange(_AZIMUTHS, dtype=np.float64) * (2.0 * math.pi / _AZIMUTHS)
     distance = _distances_m(tile, lat_rad, height_m)
     lat, lon = _walk(lat_rad, lon_rad, azimuth[:, np.newaxis], distance)
     covered = np.logical_and.accumulate(tile.covers(lat, lon), axis=1)
