@@ -200,7 +200,7 @@ def _distance_to_triangles(place: FloatArray, corners: FloatArray) -> FloatArray
     above = np.abs(np.einsum("ij,ij->i", away, normal)) / np.sqrt(square)
     foot_inside = (first >= 0.0) & (second >= 0.0) & (first + second <= 1.0)
     edges = np.min([_to_edge(place, start, end) for start, end in ((one, two), (two, three), (three, one))], axis=0)
-    return np.where(foot_inside, above, edges)
+    return np.asarray(np.where(foot_inside, above, edges))
 
 
 def _to_edge(place: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
@@ -229,7 +229,7 @@ def axes_of(axes: str) -> FloatArray:
     good = len(axes) == 3 and all(any(each in sense for each in axes) for sense in _SENSES)
     if not good or not set(axes) <= set(_AXES):
         raise AirframeError(f"axes = {axes!r} is not three letters, one of f b, one of l r, one of u d")
-    rotation: FloatArray = np.array([_AXES[each] for each in axes], dtype=np.float64).T
+    rotation: FloatArray = np.transpose(np.array([_AXES[each] for each in axes], dtype=np.float64))
     return rotation
 
 
