@@ -25,6 +25,7 @@ setup(
         "imagecodecs",
         "numpy",
         "PyYAML",
+        "scipy",
         "tifffile",
         "trimesh",
     ],

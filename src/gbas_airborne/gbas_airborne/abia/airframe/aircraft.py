@@ -79,12 +79,11 @@ def fighter(sweep_deg: float = 25.0) -> Aircraft:
     forward_deg, back_deg = FIGHTER_SWEEPS_DEG
     if not forward_deg <= sweep_deg <= back_deg:
         raise AirframeError(f"fighter: sweep_deg = {sweep_deg} is not within {forward_deg:g} to {back_deg:g}")
-    bodies = [*_fighter_fuselage(), *_fighter_tail()]
     wing = _swept_wing(math.radians(sweep_deg))
     glove = Panel(root_m=(2.3, 1.0, -0.3), tip_m=(-0.1, 2.45, -0.3), root_chord_m=5.2, tip_chord_m=2.6, thickness=0.07)
-    bodies += [wing, _mirrored(wing), glove.body(), glove.mirrored().body()]
+    parts = {**_fighter_fuselage(), "wing": [wing, _mirrored(wing), *_both(glove)]}
     antennas = (Antenna("upper", (-0.88, 0.0, -0.74)), Antenna("lower", (-0.88, 0.0, 2.13), BODY_DOWN))
-    return Aircraft(_airframe(f"fighter, wings at {sweep_deg:g} degrees", bodies), antennas)
+    return Aircraft(_airframe(f"fighter, wings at {sweep_deg:g} degrees", parts | _fighter_tail()), antennas)
 
 
 def _swept_wing(sweep_rad: float) -> Body:
@@ -107,7 +106,7 @@ def _swept_wing(sweep_rad: float) -> Body:
     return Body((body.vertices_m - pivot) @ rotation.T + pivot, body.faces)
 
 
-def _fighter_fuselage() -> list[Body]:
+def _fighter_fuselage() -> dict[str, list[Body]]:
     tail_m = _NOSE_M - _LENGTH_M
     hull = fuselage(
         [
@@ -133,10 +132,10 @@ def _fighter_fuselage() -> list[Body]:
             Section(0.62, 0.30, -0.72, -0.10),
         ]
     )
-    return [hull, canopy]
+    return {"fuselage": [hull], "canopy": [canopy]}
 
 
-def _fighter_tail() -> list[Body]:
+def _fighter_tail() -> dict[str, list[Body]]:
     fin_top_m = _BOTTOM_M + _GEAR_M - _HEIGHT_M
     fin = Panel(
         root_m=(-4.2, 0.0, -0.5), tip_m=(-7.4, 0.0, fin_top_m), root_chord_m=4.4, tip_chord_m=1.6, thickness=0.06
@@ -144,7 +143,7 @@ def _fighter_tail() -> list[Body]:
     tailplane = Panel(
         root_m=(-6.5, 0.9, 0.3), tip_m=(-8.28, 3.4, 0.3), root_chord_m=2.4, tip_chord_m=0.9, thickness=0.06
     )
-    return [fin.body(), tailplane.body(), tailplane.mirrored().body()]
+    return {"fin": [fin.body()], "tailplane": _both(tailplane)}
 
 
 # --- airliner
@@ -193,9 +192,15 @@ def airliner() -> Aircraft:
     tailplane = Panel(
         root_m=(-14.6, 0.7, -0.9), tip_m=(-18.1, 6.22, -1.45), root_chord_m=4.0, tip_chord_m=1.5, thickness=0.1
     )
-    surfaces = [each for panel in (wing, tailplane) for each in (panel.body(), panel.mirrored().body())]
+    parts = {
+        "fuselage": [hull],
+        "engine": nacelle,
+        "wing": _both(wing),
+        "tailplane": _both(tailplane),
+        "fin": [fin.body()],
+    }
     antennas = (Antenna("upper", (9.0, 0.0, -2.10)), Antenna("lower", (9.0, 0.0, 2.10), BODY_DOWN))
-    return Aircraft(_airframe("airliner", [hull, *nacelle, *surfaces, fin.body()]), antennas)
+    return Aircraft(_airframe("airliner", parts), antennas)
 
 
 # --- small unmanned aircraft
@@ -227,18 +232,24 @@ def small_uav() -> Aircraft:
     fin = Panel(
         root_m=(-0.86, 0.28, -0.10), tip_m=(-0.87, 0.0, -0.34), root_chord_m=0.19, tip_chord_m=0.17, thickness=0.09
     )
-    surfaces = [each for panel in (wing, fin) for each in (panel.body(), panel.mirrored().body())]
+    parts = {"fuselage": [pod], "boom": booms, "wing": _both(wing), "fin": _both(fin)}
     antennas = (Antenna("upper", (0.30, 0.0, -0.12)),)
-    return Aircraft(_airframe("small_uav", [pod, *booms, *surfaces]), antennas)
+    return Aircraft(_airframe("small_uav", parts), antennas)
 
 
 def _mirrored(body: Body) -> Body:
     return Body(body.vertices_m * [1.0, -1.0, 1.0], body.faces[:, ::-1])
 
 
-def _airframe(name: str, bodies: list[Body]) -> Airframe:
-    whole = joined(bodies)
-    return Airframe(name=name, vertices_m=whole.vertices_m, faces=whole.faces)
+def _both(panel: Panel) -> list[Body]:
+    """A panel and the one on the other side."""
+    return [panel.body(), panel.mirrored().body()]
+
+
+def _airframe(name: str, parts: dict[str, list[Body]]) -> Airframe:
+    whole = joined([body for bodies in parts.values() for body in bodies])
+    counts = tuple((part, sum(len(body.faces) for body in bodies)) for part, bodies in parts.items())
+    return Airframe(name=name, vertices_m=whole.vertices_m, faces=whole.faces, parts=counts)
 
 
 _BUILT_IN: Final[dict[str, Callable[[], Aircraft]]] = {

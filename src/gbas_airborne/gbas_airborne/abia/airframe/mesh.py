@@ -46,6 +46,8 @@ class Airframe:
     closed : bool
         False admits a mesh with holes, or with triangles that face both ways. Then rays may pass through the holes, and
         an antenna counts as inside if hardly any ray leaves it.
+    parts : tuple of (str, int)
+        Names of parts, each with how many of the faces are its, in their order; empty for a mesh in one piece.
 
     Raises
     ------
@@ -57,6 +59,7 @@ class Airframe:
     vertices_m: FloatArray
     faces: IntArray
     closed: bool = True
+    parts: tuple[tuple[str, int], ...] = ()
 
     def __post_init__(self) -> None:
         vertices, faces = self.vertices_m, self.faces
@@ -66,6 +69,8 @@ class Airframe:
             raise AirframeError(f"{self.name}: a corner of the mesh is not a finite position")
         if faces.min() < 0 or faces.max() >= len(vertices):
             raise AirframeError(f"{self.name}: a triangle names a corner that is not there")
+        if self.parts and sum(count for _, count in self.parts) != len(faces):
+            raise AirframeError(f"{self.name}: its parts do not have {len(faces)} triangles together")
         size_m = float(np.ptp(vertices[np.unique(faces)], axis=0).max())
         if not _SMALLEST_M <= size_m <= _LARGEST_M:
             raise AirframeError(
@@ -92,6 +97,11 @@ class Airframe:
     def corners_m(self) -> FloatArray:
         """Corners of each triangle, (F, 3 corners, 3)."""
         return self.vertices_m[self.faces]
+
+    def part_of(self, face: IntArray) -> list[str]:
+        """Names of the parts that triangles belong to."""
+        ends = np.cumsum([count for _, count in self.parts])
+        return [self.parts[int(at)][0] if self.parts else "airframe" for at in np.searchsorted(ends, face, "right")]
 
     @cached_property
     def volume_m3(self) -> float:
