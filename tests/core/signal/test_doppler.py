@@ -88,7 +88,7 @@ def test_rate_is_the_difference_of_ranges(recorded):
     state = predicted_state(recorded.ephemeris, week, times[:, np.newaxis], places, None)
     range_m, _ = rotated_range(places, state.position_m)
     middle = predicted_state(recorded.ephemeris, week, times[1], places[1], None)
-    rate = range_rate_mps(places[1], velocity, middle)
+    rate = range_rate_mps(middle, *rotated_range(places[1], middle.position_m), places[1], velocity)
     known = np.isfinite(rate)
     assert known.sum() >= 15
     np.testing.assert_allclose(rate[known], ((range_m[2] - range_m[0]) / (2 * step_s))[known], atol=1e-3)

@@ -15,34 +15,39 @@ from gbas_core.record import FloatArray
 from gbas_core.signals import FREQUENCY_HZ, SPEED_OF_LIGHT_MPS
 
 
-def range_rate_mps(receiver_m: FloatArray, velocity_mps: FloatArray, satellites: SatelliteState) -> FloatArray:
-    """Rate of the range at reception, positive when it grows, without clocks, (..., N_SATS) [m/s].
+def range_rate_mps(
+    state: SatelliteState, range_m: FloatArray, los: FloatArray, position_m: FloatArray, velocity_mps: FloatArray
+) -> FloatArray:
+    """Rate of the light-time range against time at reception, ``(..., N_SATS)`` [m/s].
 
     Parameters
     ----------
-    receiver_m, velocity_mps : (..., 3) arrays
-        Position and velocity of the receiver at reception, ECEF [m], [m/s].
-    satellites : SatelliteState
+    state : SatelliteState
         At transmission.
+    range_m, los : (..., N_SATS), (..., 3, N_SATS) arrays
+        From :func:`gbas_core.gnss.orbits.rotated_range`.
+    position_m, velocity_mps : (..., 3) arrays
+        Of the receiver at reception, ECEF [m], [m/s].
 
     Notes
     -----
-    By the derivative of the distance between the receiver and the satellite turned by the Earth during the flight, with
-    the rate of the time of transmission in that of reception.
+    The satellite's position is turned by the Earth's rotation in flight: s = R(w tau) s(t - tau), c tau = |s - r|.
+    Differentiating gives rate = e.(R v - v_r) / (1 + e.u / c), where u = R v + w x s is the satellite's velocity
+    against the stars, in the axes at reception. The denominator is the change of the flight time: 1e-5, or
+    millimetres per second.
     """
-    range_m, los = rotated_range(receiver_m, satellites.position_m)
-    angle = EARTH_RATE_RADPS * range_m / SPEED_OF_LIGHT_MPS
-    cosine, sine = np.cos(angle), np.sin(angle)
-    vx, vy, vz = np.moveaxis(satellites.velocity_mps, -2, 0)
-    x, y, _ = np.moveaxis(satellites.position_m, -2, 0)
-    east, north, up = np.moveaxis(los, -2, 0)
-    # The satellite's velocity, and what turning it with the flight time adds, along the line of sight.
-    along_satellite = east * (cosine * vx + sine * vy) + north * (cosine * vy - sine * vx) + up * vz
-    turned = east * (cosine * y - sine * x) - north * (cosine * x + sine * y)
-    along_receiver = np.einsum("...xn,...x->...n", los, velocity_mps)
-    per_flight = turned * EARTH_RATE_RADPS / SPEED_OF_LIGHT_MPS
-    # With r' the rate wanted: r' = along_satellite (1 - r'/c) - along_receiver + per_flight r'.
-    return np.asarray((along_satellite - along_receiver) / (1.0 + along_satellite / SPEED_OF_LIGHT_MPS - per_flight))
+    seen = position_m[..., :, np.newaxis] + range_m[..., np.newaxis, :] * los
+    angle = EARTH_RATE_RADPS / SPEED_OF_LIGHT_MPS * range_m
+    sin_angle, cos_angle = np.sin(angle), np.cos(angle)
+    vx, vy, vz = (state.velocity_mps[..., axis, :] for axis in range(3))
+    turned_x, turned_y = cos_angle * vx + sin_angle * vy, cos_angle * vy - sin_angle * vx
+    ex, ey, ez = (los[..., axis, :] for axis in range(3))
+    own = velocity_mps[..., :, np.newaxis]
+    opening = ex * (turned_x - own[..., 0, :]) + ey * (turned_y - own[..., 1, :]) + ez * (vz - own[..., 2, :])
+    inertial_x = turned_x - EARTH_RATE_RADPS * seen[..., 1, :]
+    inertial_y = turned_y + EARTH_RATE_RADPS * seen[..., 0, :]
+    along = ex * inertial_x + ey * inertial_y + ez * vz
+    return np.asarray(opening / (1.0 + along / SPEED_OF_LIGHT_MPS))
 
 
 def doppler_hz(
@@ -52,11 +57,14 @@ def doppler_hz(
 
     Parameters
     ----------
-    receiver_m, velocity_mps, satellites
-        See :func:`range_rate_mps`.
+    receiver_m, velocity_mps : (..., 3) arrays
+        At reception, ECEF [m], [m/s].
+    satellites : SatelliteState
+        At transmission.
     clock_drift : (...) array
         Of the receiver's clock [s/s].
     """
-    rate = range_rate_mps(receiver_m, velocity_mps, satellites) / SPEED_OF_LIGHT_MPS
+    range_m, los = rotated_range(receiver_m, satellites.position_m)
+    rate = range_rate_mps(satellites, range_m, los, receiver_m, velocity_mps) / SPEED_OF_LIGHT_MPS
     drift = np.asarray(clock_drift, dtype=np.float64)[..., np.newaxis] - satellites.clock_drift
     return np.asarray(-FREQUENCY_HZ[:, np.newaxis] * (rate + drift)[..., np.newaxis, :])
