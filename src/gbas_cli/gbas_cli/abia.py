@@ -227,9 +227,10 @@ def mask(
     print(f"{airframe.name}: {len(airframe.faces)} triangles")
     if not airframe.closed:
         print("the mesh was not checked for holes: what is behind one counts as seen")
-    print(f"hidden by the airframe      {document['hidden_percent']:.3f} % of the antenna's hemisphere")
-    print(f"of what is above {horizon_deg:g} deg    {document['hidden_above_horizon_percent']:.3f} %")
-    print(f"table against direct rays   {document['table_unlike_rays_percent']:.3f} % of 65536 directions differ")
+    above = f"of what is above {horizon_deg:g} deg"
+    print(f"hidden by the airframe     {document['hidden_percent']:.3f} % of the antenna's hemisphere")
+    print(f"{above:26} {document['hidden_above_horizon_percent']:.3f} %")
+    print(f"table against direct rays  {document['table_unlike_rays_percent']:.3f} % of 65536 directions differ")
     print_places({"picture": picture})
 
 
