@@ -12,7 +12,7 @@ propagation, QUT (2001), ch. 3 and 4; Recommendations ITU-R P.2040 and P.527 (ma
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Annotated, Final, NamedTuple
 
@@ -132,28 +132,40 @@ class Echoes:
     direct_up: FloatArray
 
     @classmethod
-    def of(cls, planes: Planes, origin: FloatArray, towards: FloatArray, *, above_ground: bool) -> Echoes:
+    def of(
+        cls,
+        planes: Planes,
+        origin: FloatArray,
+        towards: FloatArray,
+        *,
+        above_ground: bool,
+        mirrors: IndexArray | None = None,
+    ) -> Echoes:
         """Image method: the antenna's image is 2 h below it along the normal, the extra path 2 h sin(grazing angle).
+
+        Of all planes those named by `mirrors` reflect, the others only hide; all reflect unless it is given.
 
         Source: Sabatini et al., eq (25) to (28), with dot products, for a satellite at infinity.
         """
-        normal = planes.normal[:, np.newaxis, np.newaxis, :]
-        height = _dot(origin - planes.corner[:, np.newaxis, np.newaxis, :], normal)
+        named = np.arange(len(planes.corner)) if mirrors is None else mirrors
+        reflecting = planes.take(named)
+        normal = reflecting.normal[:, np.newaxis, np.newaxis, :]
+        height = _dot(origin - reflecting.corner[:, np.newaxis, np.newaxis, :], normal)
         sine = _dot(towards, normal)
         possible = (height > _CLEAR_M) & (sine > _EDGE)
         arrival = towards - 2.0 * sine[..., np.newaxis] * normal
         way = np.where(possible, height, 0.0) / np.where(possible, sine, 1.0)
         point = origin + way[..., np.newaxis] * arrival
-        there = possible & planes.contain(point)
+        there = possible & reflecting.contain(point)
         if above_ground:
             there &= point[..., 2] >= -_EDGE
         plane, row, satellite = np.nonzero(there)
         there[plane, row, satellite] = _free(
-            planes, plane, origin[row, satellite], point[there], towards[row, satellite]
+            planes, named[plane], origin[row, satellite], point[there], towards[row, satellite]
         )
         plane, row, satellite = np.nonzero(there)
         return cls(
-            plane=plane,
+            plane=named[plane],
             row=row,
             satellite=satellite,
             rank=(np.cumsum(there, axis=0) - 1)[there],
@@ -230,6 +242,10 @@ class Planes:
             triangle=triangle,
             endless=endless,
         )
+
+    def take(self, index: IndexArray) -> Planes:
+        """Some of the planes."""
+        return Planes(**{each.name: getattr(self, each.name)[index] for each in fields(self)})
 
     def contain(self, point_m: FloatArray) -> BoolArray:
         """Whether points ``(K, R, S, 3)``, of one plane each, are on the facet."""

@@ -93,11 +93,13 @@ def airframe_echoes(
     planes = Planes.of_triangles(corners[kept] @ to_antenna.T)
     towards = body_direction(azimuth, elevation) @ to_antenna.T
     known = np.flatnonzero(np.isfinite(towards).all(axis=1))
+    # Only what faces the antenna can reflect to it, from more than a micrometre away; everything can hide.
+    mirrors = np.flatnonzero(-np.einsum("ij,ij->i", planes.corner, planes.normal) > 1e-6)
     found: list[tuple[IntArray, IntArray, FloatArray, ComplexArray]] = []
     metal = MATERIALS["metal"]
-    for chosen in np.array_split(known, max(1, math.ceil(len(known) * len(kept) / _AT_ONCE))):
+    for chosen in np.array_split(known, max(1, math.ceil(len(known) * len(mirrors) / _AT_ONCE))):
         rays = towards[chosen][np.newaxis]
-        echoes = Echoes.of(planes, np.zeros_like(rays), rays, above_ground=False)
+        echoes = Echoes.of(planes, np.zeros_like(rays), rays, above_ground=False, mirrors=mirrors)
         material = np.array([[metal.permittivity], [metal.conductivity_spm], [metal.roughness_m]])
         amplitude = echoes.amplitude(material, pattern, frequency_hz)
         found.append((chosen[echoes.satellite], kept[echoes.plane], echoes.delay_m, amplitude))
