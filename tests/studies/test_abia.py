@@ -10,6 +10,7 @@ from gbas_studies.abia.airframe_items import airframe_section
 from gbas_studies.abia.echo_items import echo_section
 from gbas_studies.abia.link_items import link_section
 from gbas_studies.abia.loop_items import loop_section
+from gbas_studies.abia.recorded_items import recorded_section
 from gbas_studies.abia.requirement_items import requirement_section
 from gbas_studies.reproduction.items import Section, Verdict
 from gbas_studies.reproduction.registry import Options, run
@@ -64,6 +65,14 @@ def test_multipath():
     assert found["early-late phase sees echoes of the airframe"] is Verdict.DIFFERS
     assert found["delay of the fuselage's echo at the zenith"] is Verdict.DIFFERS
     assert {picture.name for picture in section.pictures} == {"fig-14", "fig-21", "fig-22"}
+
+
+def test_recorded_receiver(data_dir: Path):
+    section = recorded_section(Options(data=data_dir))
+    assert len(section.items) == 8
+    assert {item.verdict for item in section.items} == {Verdict.NEW}
+    (left_out,) = recorded_section(Options()).items
+    assert left_out.verdict is Verdict.LEFT_OUT
 
 
 @pytest.mark.campaign

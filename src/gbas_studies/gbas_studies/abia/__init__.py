@@ -2,5 +2,5 @@
 
 What of it: :mod:`link_items` antennas and link budget, :mod:`loop_items` tracking loops, :mod:`airframe_items` aircraft
 and masking, :mod:`echo_items` multipath, :mod:`flight_items` satellites, C/N0 and Doppler on the paper's flight,
-:mod:`requirement_items` what phases of flight require.
+:mod:`requirement_items` what phases of flight require, :mod:`recorded_items` Doppler and C/N0 of a recorded receiver.
 """

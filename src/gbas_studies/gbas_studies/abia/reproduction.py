@@ -10,6 +10,7 @@ from gbas_studies.abia.echo_items import echo_section
 from gbas_studies.abia.flight_items import flight_section
 from gbas_studies.abia.link_items import link_section
 from gbas_studies.abia.loop_items import loop_section
+from gbas_studies.abia.recorded_items import recorded_section
 from gbas_studies.abia.requirement_items import requirement_section
 from gbas_studies.reproduction.items import Claim, Reproduction, Section
 from gbas_studies.reproduction.registry import Options
@@ -26,7 +27,7 @@ _ABOUT: Final = (
 
 
 def reproduce(options: Options) -> Reproduction:
-    """The study; needs no recorded data."""
+    """The study; recordings are for what the paper has not measured."""
     steps: dict[str, Callable[[], Section]] = {
         "link budget": link_section,
         "tracking loops": loop_section,
@@ -34,6 +35,7 @@ def reproduce(options: Options) -> Reproduction:
         "multipath": lambda: echo_section(options),
         "requirements": requirement_section,
         "flight": flight_section,
+        "recorded": lambda: recorded_section(options),
         "flags": flag_section,
     }
     sections = []
