@@ -15,7 +15,9 @@ from gbas_airborne.abia.visibility.geometry import dilution
 from gbas_airborne.abia.visibility.satellites_in_view import HiddenBy, Path, satellites_in_view
 from gbas_core.gnss.almanac import ephemeris_from_almanac, read_almanac
 from gbas_core.gnss.attitude import body_azimuth_elevation, euler_angles, rot_euler
+from gbas_core.gnss.ephemeris import EphemerisStore
 from gbas_core.gnss.frames import ecef_from_geodetic
+from gbas_core.io.rinex import read_navigation, read_observations
 from gbas_core.satellites import N_SATS
 
 LAT, LON = math.radians(48.0), math.radians(11.0)
@@ -141,3 +143,28 @@ def test_what_is_not_known_is_not_in_view(data_dir):
     assert late.in_view.any(axis=1).tolist() == [True, True, False]
     with pytest.raises(ValueError, match="roll_rad has shape"):
         dataclasses.replace(blind, roll_rad=np.zeros(2))
+
+
+def test_recorded_receiver_sees_what_is_in_view(data_dir):
+    """Broadcast orbits at a still receiver of known place: all it observes is in view, down to 1 degree."""
+    folder = data_dir / "static_pair_L1L5_2024"
+    observed = read_observations(folder / "base.obs.gz")
+    week, tow_s = observed.first
+    store = EphemerisStore()
+    for each in read_navigation(folder / "base.nav.gz").received(week, tow_s):
+        store = store.add(each)
+    lat_deg, lon_deg, height_m = (float(each) for each in (folder / "base_position.txt").read_text().split())
+    zero = np.zeros(1)
+    still = Path(
+        gps_week=week,
+        tow_s=np.array([tow_s]),
+        position_m=ecef_from_geodetic(math.radians(lat_deg), math.radians(lon_deg), height_m)[np.newaxis],
+        roll_rad=zero,
+        pitch_rad=zero,
+        heading_rad=zero,
+    )
+    ephemeris = store.usable(week, tow_s, 0.0)
+    seen = satellites_in_view(ephemeris, still, MaskTable.open_sky(0.0), lowest_rad=math.radians(1.0))
+    there = np.isfinite(observed.code_m[0]).any(axis=0) & np.isfinite(ephemeris.sqrt_a)
+    assert there.sum() >= 15
+    assert seen.in_view[0][there].all()
