@@ -37,6 +37,7 @@ def test_link_budget_options():
     assert cn0("--antenna", "isotropic") == pytest.approx(base - (7.8659 * 0.5 - 4.3659), abs=1e-6)
     assert cn0("--orbit-radius-km", 26_559.7) == pytest.approx(base)
     assert cn0("--bank-deg", 20.0) < base
+    assert cn0("--bank-deg", -120.0) == pytest.approx(base)  # over the top: 150 degrees is 30 again
     assert cn0("--signal", "E5a") > base
 
 

@@ -102,7 +102,7 @@ def _terms(
         options |= {"gps_eirp_dbw": (eirp_dbw, eirp_dbw), "galileo_eirp_dbw": (eirp_dbw, eirp_dbw)}
     elevation = elevation_rad[:, np.newaxis] * np.ones(N_SATS)
     distance = None if orbit_radius_km is None else slant_range_m(elevation, 1e3 * orbit_radius_km)
-    found = TransmitBudget(**options).terms(elevation, elevation - bank_rad, distance)
+    found = TransmitBudget(**options).terms(elevation, np.arcsin(np.sin(elevation - bank_rad)), distance)
     satellite, band = int(np.argmax(SYSTEM_MASKS[system])), BAND_INDEX[band_name]
     parts = {
         name: getattr(found, name)[..., min(band, getattr(found, name).shape[-2] - 1), satellite]
