@@ -81,6 +81,7 @@ ROOMS = {
         "protection",
         "service",
         "receiver",
+        "abia",
         "nodes",
     ),
     "gbas_sim": (

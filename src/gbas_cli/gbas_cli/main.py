@@ -15,6 +15,7 @@ from typing import Annotated, Any
 import typer
 
 from gbas_bringup import __version__
+from gbas_cli import abia as cli_abia
 from gbas_cli import bag as cli_bag
 from gbas_cli import config as cli_config
 from gbas_cli import reproduce as cli_reproduce
@@ -46,6 +47,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+app.add_typer(cli_abia.app, name="abia")
 app.add_typer(cli_bag.app, name="bag")
 app.add_typer(cli_config.app, name="config")
 app.add_typer(cli_sim.app, name="sim")

@@ -24,8 +24,8 @@ from gbas_core.signals import L1, L2, L5, N_BANDS, WAVELENGTH_M
 
 Beam = Literal["isoflux", "paper"]
 
-_REFERENCE_K: Final = 290.0
-_BOLTZMANN_DBWPKHZ: Final = 10.0 * math.log10(1.380649e-23)
+REFERENCE_K: Final = 290.0
+BOLTZMANN_DBWPKHZ: Final = 10.0 * math.log10(1.380649e-23)
 # Uncertain, ours: from the antenna to the edge of the roof it is on.
 _ROOF_EDGE_M: Final = 2.0
 _WAVELENGTHS_M: Final[FloatArray] = np.where(np.arange(N_BANDS) == L2, np.nan, WAVELENGTH_M)
@@ -120,6 +120,18 @@ def oxygen_loss_db(elevation_rad: ArrayLike) -> FloatArray:
     return np.asarray(2.0 * _OXYGEN_ZENITH_DB * (1.0 + 0.5 * height) / path)
 
 
+def paper_beam_db(elevation_rad: ArrayLike) -> FloatArray:
+    """Gain of a satellite's antenna less that towards the zenith of the receiver [dB].
+
+    Source: Sabatini et al., eq (14), E being the elevation.
+
+    Notes
+    -----
+    Satellites shape their beams the other way, to favour the edge of the Earth.
+    """
+    return np.asarray(2.5413 * (np.sin(elevation_rad) - 1.0))
+
+
 def airframe_loss_db(antenna_elevation_rad: FloatArray) -> FloatArray:
     """What an airframe takes from satellites below the antenna's plane, ``(..., N_BANDS, N_SATS)`` [dB]; NaN on L2.
 
@@ -143,10 +155,14 @@ def _knife_edge_db(depth: FloatArray) -> FloatArray:
     return np.asarray(6.9 + 20.0 * np.log10(np.sqrt((depth - 0.1) ** 2 + 1.0) + depth - 0.1))
 
 
-def slant_range_m(elevation_rad: FloatArray) -> FloatArray:
-    """Distance to satellites ``(..., N_SATS)`` on circular orbits at elevations seen from the ground [m]."""
+def slant_range_m(elevation_rad: FloatArray, orbit_radius_m: ArrayLike = _ORBIT_RADIUS_M) -> FloatArray:
+    """Distance to satellites on circular orbits at elevations seen from the ground [m].
+
+    Elevations are ``(..., N_SATS)``, or whatever goes with the radii given.
+    """
     sine = np.sin(elevation_rad)
-    return np.asarray(np.sqrt(_ORBIT_RADIUS_M**2 - _EARTH_RADIUS_M**2 * (1.0 - sine**2)) - _EARTH_RADIUS_M * sine)
+    from_centre = np.asarray(orbit_radius_m, dtype=np.float64) ** 2 - _EARTH_RADIUS_M**2 * (1.0 - sine**2)
+    return np.asarray(np.sqrt(from_centre) - _EARTH_RADIUS_M * sine)
 
 
 @parameters
@@ -203,8 +219,8 @@ class LinkBudget:
     @property
     def noise_dbwphz(self) -> float:
         """Noise density [dBW/Hz]."""
-        receiver_k = _REFERENCE_K * (10.0 ** (0.1 * self.noise_figure_db) - 1.0)
-        return _BOLTZMANN_DBWPKHZ + 10.0 * math.log10(self.antenna_temperature_k + receiver_k)
+        receiver_k = REFERENCE_K * (10.0 ** (0.1 * self.noise_figure_db) - 1.0)
+        return BOLTZMANN_DBWPKHZ + 10.0 * math.log10(self.antenna_temperature_k + receiver_k)
 
     def received_dbw(self, elevation_rad: FloatArray) -> FloatArray:
         """Power at an isotropic antenna on the ground, through the air, ``(..., N_BANDS, N_SATS)``; NaN on L2 [dBW]."""
@@ -212,7 +228,7 @@ class LinkBudget:
         if self.beam == "paper":
             nearest = _ORBIT_RADIUS_M - _EARTH_RADIUS_M
             spread = 20.0 * np.log10(nearest / slant_range_m(elevation_rad))
-            change = change + spread + 2.5413 * (np.sin(elevation_rad) - 1.0)
+            change = change + spread + paper_beam_db(elevation_rad)
         received = np.full((*change.shape[:-1], N_BANDS, N_SATS), np.nan)
         for band, gps, galileo in zip((L1, L5), self.gps_dbw, self.galileo_dbw, strict=True):
             received[..., band, :] = np.where(IS_GPS, gps, galileo) + change

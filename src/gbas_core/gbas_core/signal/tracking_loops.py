@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Annotated, Final, NamedTuple
+from typing import Annotated, Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -135,7 +135,7 @@ def code_sigma_s(jitter: CodeJitter, cn0_dbhz: ArrayLike, bandwidth_hz: float, i
 
     Source: K&H eq (5.22).
     """
-    ratio = _linear(cn0_dbhz)
+    ratio = cn0_ratio_hz(cn0_dbhz)
     variance = jitter.variance_s2 * bandwidth_hz / ratio * (1.0 + jitter.squaring / (integration_s * ratio))
     return np.asarray(np.sqrt(variance))
 
@@ -145,15 +145,18 @@ def phase_sigma_rad(cn0_dbhz: ArrayLike, bandwidth_hz: float, integration_s: flo
 
     Source: K&H eq (5.6); Sabatini et al., eq (44), with C/N0 as a ratio and radians for degrees.
     """
-    return _phase_rad(_linear(cn0_dbhz), bandwidth_hz, integration_s)
+    return _phase_rad(cn0_ratio_hz(cn0_dbhz), bandwidth_hz, integration_s)
 
 
-def frequency_sigma_hz(cn0_dbhz: ArrayLike, bandwidth_hz: float, integration_s: float) -> FloatArray:
-    """Standard deviation of a frequency loop's thermal noise at high C/N0 [Hz].
+def frequency_sigma_hz(
+    cn0_dbhz: ArrayLike, bandwidth_hz: float, integration_s: float, *, near_threshold: bool = False
+) -> FloatArray:
+    """Standard deviation of a frequency loop's thermal noise [Hz].
 
-    Source: K&H 5.6.2; Sabatini et al., eq (51), F = 1, with C/N0 as a ratio.
+    Source: K&H 5.6.2; Sabatini et al., eq (51), with C/N0 as a ratio; F = 1, but 2 near the threshold.
     """
-    return _frequency_hz(_linear(cn0_dbhz), bandwidth_hz, integration_s)
+    factor = 2.0 if near_threshold else 1.0
+    return _frequency_hz(cn0_ratio_hz(cn0_dbhz), factor * bandwidth_hz, integration_s)
 
 
 def vibration_phase_rad(frequency_hz: float, sensitivity_per_g: float, power_g2phz: float) -> float:
@@ -165,25 +168,49 @@ def vibration_phase_rad(frequency_hz: float, sensitivity_per_g: float, power_g2p
     return frequency_hz * sensitivity_per_g * math.sqrt(power_g2phz * (1.0 / low_hz - 1.0 / high_hz))
 
 
-def oscillator_phase_rad(frequency_hz: float, allan_deviation: float, bandwidth_hz: float) -> float:
-    """Phase jitter of a third-order loop from an oscillator's instability over about 1/bandwidth [rad].
+def oscillator_phase_rad(
+    frequency_hz: float, allan_deviation: float, bandwidth_hz: float, order: Literal[2, 3] = 3
+) -> float:
+    """Phase jitter of a loop from an oscillator's instability over about 1/bandwidth [rad].
 
-    Source: K&H eq (5.13); Sabatini et al., eq (48).
+    Source: K&H eq (5.12), (5.13); Sabatini et al., eq (47), (48).
 
     Notes
     -----
-    The factor 160 of both gives degrees; the second says radians, which would be 57 times too much.
+    The factors 144 and 160 of both give degrees; the second says radians, which would be 57 times too much.
     """
-    return math.radians(160.0 * allan_deviation * frequency_hz / bandwidth_hz)
+    return math.radians(_OSCILLATOR_DEG[order] * allan_deviation * frequency_hz / bandwidth_hz)
 
 
-def dynamic_phase_rad(frequency_hz: float, jerk_mps3: float, bandwidth_hz: float) -> float:
-    """Phase error of a third-order loop under a jerk along the line of sight [rad].
+_OSCILLATOR_DEG: Final = {2: 144.0, 3: 160.0}
 
-    Source: K&H eq (5.16) and table 5.6: jerk over the cube of bandwidth / 0.7845; Sabatini et al., eq (49), whose text
-    says acceleration where its formula and number are a jerk.
+
+def natural_rate_radps(bandwidth_hz: float, order: Literal[1, 2, 3]) -> float:
+    """Natural frequency of a loop with that noise bandwidth [rad/s].
+
+    Source: K&H table 5.6.
     """
-    return 2.0 * math.pi * frequency_hz / SPEED_OF_LIGHT_MPS * jerk_mps3 * (0.7845 / bandwidth_hz) ** 3
+    return bandwidth_hz / _BANDWIDTH_OVER_RATE[order]
+
+
+_BANDWIDTH_OVER_RATE: Final = {1: 0.25, 2: 0.53, 3: 0.7845}
+
+
+def dynamic_phase_rad(
+    frequency_hz: float, motion: ArrayLike, bandwidth_hz: float, order: Literal[2, 3] = 3
+) -> FloatArray:
+    """Phase error of a loop under motion along the line of sight [rad].
+
+    Parameters
+    ----------
+    motion : array
+        What the loop does not follow: acceleration [m/s^2] with order 2, jerk [m/s^3] with order 3.
+
+    Source: K&H eq (5.16) and table 5.6: over the natural frequency to the power of the order; Sabatini et al., eq (49),
+    whose text says acceleration where its formula and number are a jerk.
+    """
+    radians = 2.0 * math.pi * frequency_hz / SPEED_OF_LIGHT_MPS * np.abs(np.asarray(motion, dtype=np.float64))
+    return np.asarray(radians / natural_rate_radps(bandwidth_hz, order) ** order)
 
 
 CODE_BANDWIDTH: Final = Parameter("one-sided noise bandwidth of the code loop", "Hz", 0.01, 10.0)
@@ -238,7 +265,7 @@ class NoiseSigmas(NamedTuple):
 def noise_sigmas(params: TrackingParams, cn0_dbhz: FloatArray) -> NoiseSigmas:
     """Thermal noise at C/N0 ``(..., N_BANDS, N_SATS)`` [dB-Hz]."""
     variance, squaring = _jitters(params)
-    ratio = _linear(cn0_dbhz)
+    ratio = cn0_ratio_hz(cn0_dbhz)
     coherent = params.integration_s * ratio
     code_s = np.sqrt(variance * (params.code_bandwidth_hz / ratio) * (1.0 + squaring / coherent))
     phase_rad = _phase_rad(ratio, params.carrier_bandwidth_hz, params.integration_s)
@@ -268,13 +295,13 @@ def lock_threshold_dbhz(params: TrackingParams) -> FloatArray:
         frequency_hz = float(FREQUENCY_HZ[L5 if modulation is BPSK_10 else L1])
         jitter = code_jitter(modulation, params.spacing_chips[signal], params.front_end_hz[signal])
         half_spacing_s = 0.5 * params.spacing_chips[signal] / modulation.chip_rate_hz
-        code = _threshold_dbhz(
+        code = threshold_dbhz(
             half_spacing_s**2 / 9.0,
             jitter.variance_s2 * params.code_bandwidth_hz,
             jitter.squaring / params.integration_s,
         )
         left = phase_margin_rad2(params, frequency_hz)
-        phase = _threshold_dbhz(left, params.carrier_bandwidth_hz, 0.5 / params.integration_s)
+        phase = threshold_dbhz(left, params.carrier_bandwidth_hz, 0.5 / params.integration_s)
         thresholds.append(max(code, phase))
     return per_signal((thresholds[0], thresholds[1], thresholds[2]))
 
@@ -284,7 +311,7 @@ def phase_margin_rad2(params: TrackingParams, frequency_hz: float) -> float:
 
     Source: Sabatini et al., eq (43): sqrt(thermal + vibration^2 + oscillator^2) + dynamic / 3 <= 15 degrees.
     """
-    dynamic = dynamic_phase_rad(frequency_hz, params.jerk_mps3, params.carrier_bandwidth_hz)
+    dynamic = float(dynamic_phase_rad(frequency_hz, params.jerk_mps3, params.carrier_bandwidth_hz))
     jitter = math.radians(15.0) - dynamic / 3.0
     vibration = vibration_phase_rad(frequency_hz, params.vibration_sensitivity_per_g, params.vibration_g2phz)
     oscillator = oscillator_phase_rad(frequency_hz, params.allan_deviation, params.carrier_bandwidth_hz)
@@ -306,7 +333,7 @@ def _jitters(params: TrackingParams) -> tuple[FloatArray, FloatArray]:
     return variance, squaring
 
 
-def _linear(cn0_dbhz: ArrayLike) -> FloatArray:
+def cn0_ratio_hz(cn0_dbhz: ArrayLike) -> FloatArray:
     """C/N0 as a ratio [Hz]."""
     return np.asarray(10.0 ** (0.1 * np.asarray(cn0_dbhz, dtype=np.float64)))
 
@@ -320,8 +347,8 @@ def _frequency_hz(ratio: FloatArray, bandwidth_hz: float, integration_s: float) 
     return np.asarray(scale * np.sqrt(bandwidth_hz / ratio * (1.0 + 1.0 / (integration_s * ratio))))
 
 
-def _threshold_dbhz(allowed: float, first: float, second: float) -> float:
-    """C/N0 at which ``first x (1 + second x)``, x its inverse, is `allowed` [dB-Hz]."""
+def threshold_dbhz(allowed: float, first: float, second: float) -> float:
+    """C/N0 at which ``first x (1 + second x)``, x its inverse, is `allowed`; infinity for none left [dB-Hz]."""
     if not allowed > 0.0:
         return math.inf
     root = (math.sqrt(first**2 + 4.0 * first * second * allowed) - first) / (2.0 * first * second)
