@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from gbas_airborne.params import AirborneParams
-from gbas_bringup.launcher import RunPlan, commands, launch_parameters
+from gbas_bringup.launcher import RunPlan, launch_parameters, programs
 from gbas_bringup.node_kinds import NODE_KINDS, NodeInstance, Stage
 from gbas_bringup.resources import config_path, named_config, resources
 from gbas_bringup.run_config import one_driver, read_run_config
@@ -57,8 +57,7 @@ def test_second_aircraft_is_a_second_namespace(tmp_path: Path) -> None:
     plan = RunPlan(config=config, directory=tmp_path)
     waits = launch_parameters(plan)["/gbas/receiver_replay"]["wait_for"]
     assert sorted(waits) == ["/gbas/second/progress/protection_level", "protection_level"]
-    command, _ = commands(plan)["second/positioning"]
-    assert "__ns:=/gbas/second" in command
+    assert "__ns:=/gbas/second" in programs(plan)["second/positioning"].arguments
 
 
 def test_player_takes_the_place_of_the_driver(tmp_path: Path) -> None:
@@ -118,9 +117,10 @@ def test_everybody_waits_for_the_recorder(tmp_path: Path) -> None:
 
 def test_single_process_is_one_command(tmp_path: Path) -> None:
     config = read_run_config(written(tmp_path, REPLAY)).with_nodes()
-    ((command, stage),) = commands(RunPlan(config=config, directory=tmp_path, single_process=True)).values()
-    assert stage is Stage.DRIVER
-    assert [part for part in command if part.startswith("/gbas/")] == [node.full_name for node in config.nodes]
+    (program,) = programs(RunPlan(config=config, directory=tmp_path, single_process=True)).values()
+    assert program.stage is Stage.DRIVER
+    named = [part for part in program.arguments if part.startswith("/gbas/")]
+    assert named == [node.full_name for node in config.nodes]
 
 
 def test_every_site_file_is_read_by_those_it_is_for() -> None:
