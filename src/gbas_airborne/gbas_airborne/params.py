@@ -15,19 +15,52 @@ from typing import Annotated, Any, Final, Literal
 from gbas_core.configuration import read_configuration
 from gbas_core.parameters import Parameter, ParameterError, from_mapping, parameters
 from gbas_core.ranging.slips import NORMAL_MANOEUVRE_JERK_MPS3
+from gbas_msgs_py import modes
 from gbas_vdb.transmission.burst import SLOT_NAMES
 
 SECTION: Final = "airborne"
 NO_FAS: Final = -1
 MAX_RPDS: Final = 48
+ALL_MODES: Final = "all"
 _MAX_STATION_ID: Final = 4
+
+
+@parameters
+class ServiceDParams:
+    """GAST-D: what its protection levels and monitors are set to.
+
+    Sources: RTCA DO-253D by way of published descriptions; uncertain are all limits but those of the divergence.
+    """
+
+    protection_probability: Annotated[
+        float, Parameter("probability the protection level multipliers of GAST-D are made from", "-", 1e-15, 1e-3)
+    ] = 1.25e-10
+    low_timeout_s: Annotated[
+        float, Parameter("guidance is lost without messages for this long below 200 ft", "s", 0.0, 3.5)
+    ] = 1.5
 
 
 @parameters
 class AirborneParams:
     """Choices of the airborne receiver."""
 
-    service: Annotated[Literal["C"], Parameter("approach service type asked for")] = "C"
+    service: Annotated[
+        Literal["C", "D", "L5-100", "L5-30", "IF-100", "IF-30"],
+        Parameter("approach service type asked for: C, D, or one of two bands that no standard has yet"),
+    ] = "C"
+    fallback: Annotated[
+        bool,
+        Parameter(
+            "where the service asked for cannot be given, the next one guides: D or L5, then C; IF, then L5, then C"
+        ),
+    ] = True
+    modes: Annotated[
+        tuple[str, ...],
+        Parameter(
+            "processing modes that run beside it for /gbas/airborne/modes, by their names in docs/contract.md; "
+            "'all' is every mode of the systems used"
+        ),
+    ] = ()
     aad: Annotated[Literal["A", "B"], Parameter("airborne accuracy designator")] = "A"
     systems: Annotated[
         Literal["G", "E", "GE", "EG"],
@@ -59,8 +92,12 @@ class AirborneParams:
     ] = math.radians(5.0)
     smoothing_tau_s: Annotated[
         float,
-        Parameter("time constant of the carrier smoothing: 100 for GAST-C, 0 for none (comparisons)", "s", 0.0, 1000.0),
-    ] = 100.0
+        Parameter(
+            "time constant of the carrier smoothing of GAST-C where that guides: 100, or 0 for none (comparisons); the "
+            "other modes have their own",
+            "s", 0.0, 1000.0,
+        ),
+    ] = 100.0  # fmt: skip
     settle_s: Annotated[
         float,
         Parameter("a satellite is used once its filter has run for this (docs/decisions/0002)", "s", 0.0, 3600.0),
@@ -164,11 +201,16 @@ class AirborneParams:
     ] = 1e-5
     k_ffmd_single: Annotated[float, Parameter("K_ffmd with one reference receiver", "-", 1.0, 20.0)] = 6.86
 
+    gast_d: ServiceDParams = ServiceDParams()
+
     def __post_init__(self) -> None:
         if not _distinct(self.slot_group, SLOT_NAMES):
             raise ParameterError(f"slot_group = {self.slot_group!r} is not of distinct letters A to H")
         if self.slot_group and not self.authentication:
             raise ParameterError(f"slot_group = {self.slot_group!r} is given without authentication")
+        known = {mode.name for mode in modes.MODES} | {ALL_MODES}
+        if unknown := [name for name in self.modes if name not in known]:
+            raise ParameterError(f"modes = {unknown[0]!r} is not one of {', '.join(sorted(known))}")
         if len(self.station_id) > _MAX_STATION_ID:
             raise ParameterError(f"station_id = {self.station_id!r} has more than {_MAX_STATION_ID} characters")
 

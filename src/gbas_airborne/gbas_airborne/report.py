@@ -11,7 +11,6 @@ from gbas_airborne.navigation.kernels.report import COLUMNS, used_columns
 from gbas_airborne.navigation.locate import Located
 from gbas_airborne.navigation.position import Fix, PositionResult
 from gbas_airborne.reception.receive import Received
-from gbas_airborne.reception.station_data import Corrections
 from gbas_msgs_py.modes import Mode
 from gbas_msgs_py.records import SolutionEpoch
 
@@ -28,7 +27,7 @@ def no_positions(received: Received, modes: tuple[Mode, ...]) -> tuple[SolutionE
 
 def _station_columns(received: Received, mode: Mode) -> dict[str, Any]:
     """What is known without a position."""
-    station, corrections = received.station, received.corrections.get(mode.product)
+    station, sets = received.station, [received.corrections.get(name) for name in mode.products]
     columns: dict[str, Any] = {
         "gps_week": received.gps_week,
         "tow_s": received.tow_s,
@@ -37,19 +36,19 @@ def _station_columns(received: Received, mode: Mode) -> dict[str, Any]:
         "k_md_e": station.k_md_e if station is not None else math.nan,
         **approach_columns(received.approach),
     }
-    if corrections is not None:
-        columns["correction_age_s"] = received.since_s((corrections.gps_week, corrections.tow_s))
-        columns["message_age_s"] = received.since_s(corrections.received)
+    known = [each for each in sets if each is not None]
+    if len(known) == len(sets):
+        columns["correction_age_s"] = max(received.since_s((each.gps_week, each.tow_s)) for each in known)
+        columns["message_age_s"] = max(received.since_s(each.received) for each in known)
     return columns
 
 
 def _solution(received: Received, result: PositionResult) -> SolutionEpoch:
     mode = result.sources.mode
     columns = _station_columns(received, mode)
-    corrections = received.corrections.get(mode.product)
-    if result.fix is not None and corrections is not None:
+    if result.fix is not None:
         columns |= _position_columns(result.fix)
-        columns |= _satellite_columns(received, result, result.fix, corrections)
+        columns |= _satellite_columns(received, result, result.fix)
         columns |= guidance_columns(received.approach, result.fix.position_m)
     return SolutionEpoch(**columns)
 
@@ -68,13 +67,11 @@ def _position_columns(fix: Fix) -> dict[str, Any]:
     }
 
 
-def _satellite_columns(
-    received: Received, result: PositionResult, fix: Fix, corrections: Corrections
-) -> dict[str, Any]:
+def _satellite_columns(received: Received, result: PositionResult, fix: Fix) -> dict[str, Any]:
     """Rows of the satellites used, and how many of them and of receivers there are."""
     tan_gpa = math.tan(received.approach.gpa_rad) if received.approach is not None else 0.0
     rows, n_sats, n_receivers = used_columns(
-        result.reason, fix.sky, fix.projection, tan_gpa, corrections.columns, received.checks.columns, fix.distance_m
+        result.reason, fix.sky, fix.projection, tan_gpa, result.sources.applied, received.checks.columns, fix.distance_m
     )
     columns: dict[str, Any] = dict(zip(COLUMNS, rows, strict=False))
     return {**columns, "b_m": rows[len(COLUMNS) :], "n_sats": float(n_sats), "n_receivers": float(n_receivers)}

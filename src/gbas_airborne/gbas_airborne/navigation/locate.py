@@ -14,6 +14,7 @@ from gbas_airborne.modes import subject_prefix
 from gbas_airborne.navigation.position import PositionInputs, PositionResult, Prior, find_positions
 from gbas_airborne.params import AirborneParams
 from gbas_airborne.ranging.corrected_ranges import Corrected, RangingSources
+from gbas_airborne.reception.columns import B_VALUES, IOD
 from gbas_airborne.reception.receive import Received
 from gbas_airborne.reception.station_data import StationData
 from gbas_airborne.reception.vdb_messages import SOURCE
@@ -95,12 +96,12 @@ def _inputs(
     before: ModePosition, received: Received, sources: RangingSources, params: AirborneParams
 ) -> PositionInputs | None:
     """What the position of a mode is made of, without the satellites that are held out; None without corrections."""
-    station, corrections = received.station, received.corrections.get(sources.mode.product)
-    if station is None or corrections is None:
+    station = received.station
+    if station is None or not sources.corrected:
         return None
     held = (sources.reason == int(Rejection.NONE)) & (before.held_until_ms > received.epoch_ms)
     reason = np.where(held, int(Rejection.RANGE_TEST), sources.reason)
-    return PositionInputs(sources, reason, corrections, _prior(before, received, station, params))
+    return PositionInputs(sources, reason, _prior(before, received, station, params))
 
 
 def _prior(before: ModePosition, received: Received, station: StationData, params: AirborneParams) -> Prior:
@@ -145,13 +146,12 @@ def _evidence(
 ) -> tuple[str, float, float]:
     """Subject, value and threshold of an exclusion; an ephemeris is named by its satellite and issue of data."""
     satellite, sources = SAT_IDS[index], result.sources
-    station, corrections = received.station, received.corrections.get(sources.mode.product)
-    if station is None or corrections is None:
+    station, iod = received.station, float(sources.applied[IOD, index])
+    if station is None or not sources.corrected:
         return satellite, math.nan, math.nan
-    iod = corrections.iod[index]
     numbers: dict[Rejection, tuple[float, float]] = {
         Rejection.CORRECTION_AGE: (sources.age_s, params.correction_timeout_s),
-        Rejection.B_VALUES: (np.isfinite(corrections.b_m[:, index]).sum(), station.n_receivers),
+        Rejection.B_VALUES: (np.isfinite(sources.applied[B_VALUES:, index]).sum(), station.n_receivers),
         Rejection.EPHEMERIS_IOD: (math.nan, iod),
         Rejection.EPHEMERIS_CRC_MISSING: (sources.own_crc[index], math.nan),
         Rejection.EPHEMERIS_CRC_MISMATCH: (sources.own_crc[index], received.checks.crc[index]),

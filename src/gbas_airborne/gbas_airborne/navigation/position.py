@@ -16,16 +16,24 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gbas_airborne.modes import product_of
+from gbas_airborne.modes import pair, processing_of
 from gbas_airborne.navigation.kernels.position import ELEVATION, RANGE_ERROR, Conditions, tested_positions
 from gbas_airborne.params import AirborneParams
 from gbas_airborne.ranging.corrected_ranges import RangingSources
 from gbas_airborne.reception.columns import SIGMA
-from gbas_airborne.reception.station_data import Corrections, StationData
-from gbas_core.models.error_models import AAD_A, AAD_B
+from gbas_airborne.reception.station_data import StationData
+from gbas_core.models.error_models import (
+    AAD_A,
+    AAD_B,
+    AIRFRAME_MULTIPATH,
+    L5_MULTIPATH_SURROGATE,
+    L5_NOISE_SURROGATE,
+    AirborneCurve,
+)
 from gbas_core.positioning.approach import FinalApproach
 from gbas_core.record import FloatArray, IntArray
 from gbas_core.satellites import CLOCK_GROUPS
+from gbas_msgs_py.codes import Signal
 from gbas_msgs_py.modes import Mode
 
 GROUP: Final[IntArray] = CLOCK_GROUPS.argmax(axis=0)
@@ -56,7 +64,6 @@ class PositionInputs(NamedTuple):
 
     sources: RangingSources
     reason: NDArray[np.int64]
-    corrections: Corrections
     prior: Prior
 
 
@@ -123,11 +130,13 @@ def find_positions(
         np.array([each.sources.range_m for each in inputs]),
         np.array([each.sources.satellite_m for each in inputs]),
         np.array([each.sources.noise_factor for each in inputs]),
-        np.array([each.corrections.columns[SIGMA] for each in inputs]),
+        np.array([(each.sources.applied[SIGMA], each.sources.weight_sigma_m) for each in inputs]),
         station.reference_ecef_m,
         np.array(recent),
         np.array([each.prior.dt_s for each in inputs]),
-        np.array([_smoothing_s(each.sources.mode) for each in inputs]),
+        np.array([processing_of(each.sources.mode).coefficient for each in inputs]),
+        np.array([_curves(each.sources.mode, params.aad) for each in inputs]),
+        np.array([_iono(each.sources.mode, station) for each in inputs]),
         approach.rot_approach_ecef if approach is not None else _NO_APPROACH,
         GROUP,
         len(CLOCK_GROUPS),
@@ -155,24 +164,34 @@ def find_positions(
 
 
 @lru_cache(maxsize=64)
-def _smoothing_s(mode: Mode) -> float:
-    """Time constant of the ionospheric sigma: corrections are smoothed over theirs, whatever the aircraft does [s]."""
-    return float(max(mode.smoothing_s, product_of(mode).smoothing_s))
+def _curves(mode: Mode, aad: str) -> tuple[tuple[float, ...], ...]:
+    """Coefficients of airborne noise and multipath of the signals of a mode; those of L5 are surrogates."""
+    noise_l1 = AAD_A if aad == "A" else AAD_B
+    known = {Signal.L1: (noise_l1, AIRFRAME_MULTIPATH)}
+    of_l5 = (L5_NOISE_SURROGATE, L5_MULTIPATH_SURROGATE)
+    rows = tuple(
+        sum((_coefficients(curve) for curve in known.get(signal, of_l5)), start=()) for signal, _ in mode.components
+    )
+    return pair(rows)
+
+
+def _coefficients(curve: AirborneCurve) -> tuple[float, ...]:
+    return curve.a0_m, curve.a1_m, curve.theta0_deg
+
+
+def _iono(mode: Mode, station: StationData) -> tuple[float, float, float]:
+    """sigma_vig, ionospheric delay over that on L1, and time constant."""
+    return float(station.sigma_vig), mode.iono_factor, processing_of(mode).iono_tau_s
 
 
 def _conditions(station: StationData, params: AirborneParams) -> Conditions:
-    noise = AAD_A if params.aad == "A" else AAD_B
     return Conditions(
         height_m=float(station.reference_height_m),
         d_max_m=float(station.d_max_m),
-        sigma_vig=float(station.sigma_vig),
         refractivity=float(station.refractivity),
         refractivity_uncertainty=float(station.refractivity_uncertainty),
         scale_height_m=float(station.scale_height_m),
         mask_rad=float(params.elevation_mask_rad),
-        noise_a0_m=noise.a0_m,
-        noise_a1_m=noise.a1_m,
-        noise_theta0_deg=noise.theta0_deg,
         assumed_mps=float(params.max_speed_mps),
         max_condition=float(params.max_condition),
         max_iterations=int(params.max_iterations),

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from gbas_airborne.modes import band_of
+from gbas_airborne.modes import bands_of
 from gbas_airborne.params import AirborneParams
 from gbas_airborne.reception.receive import Received
 from gbas_core.gnss.observations import LARGEST_OBSERVATION
@@ -59,12 +59,17 @@ class Tracked:
     channels: FilteredChannels
     tau_s: tuple[float, ...]
 
-    def ranges(self, mode: Mode) -> SmoothedRanges:
-        """The ranges a mode works with."""
-        band = band_of(mode)
-        smoothed_m = self.channels.smoothed_of(band)[self.tau_s.index(mode.smoothing_s), 0]
-        settled_s = self.channels.age_of(band)[0]
-        return SmoothedRanges(code_m=self.code_m[band], smoothed_m=smoothed_m, settled_s=settled_s)
+    def ranges(self, mode: Mode) -> tuple[SmoothedRanges, ...]:
+        """The ranges a mode works with, one a signal."""
+        place = self.tau_s.index(mode.smoothing_s)
+        return tuple(
+            SmoothedRanges(
+                code_m=self.code_m[band],
+                smoothed_m=self.channels.smoothed_of(band)[place, 0],
+                settled_s=self.channels.age_of(band)[0],
+            )
+            for band in bands_of(mode)
+        )
 
 
 @lru_cache(maxsize=8)
@@ -75,7 +80,7 @@ def filter_params(modes: tuple[Mode, ...], params: AirborneParams) -> ChannelFil
     alone, which would look like a slip on every satellite.
     """
     return ChannelFilterParams(
-        bands=tuple(sorted({band_of(mode) for mode in modes})),
+        bands=tuple(sorted({band for mode in modes for band in bands_of(mode)})),
         slips=SlipParams(
             max_gap_s=params.max_gap_s, receiver_jerk_mps3=params.receiver_jerk_mps3, follow_code_steps=True
         ),
