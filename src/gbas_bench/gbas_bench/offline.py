@@ -181,7 +181,7 @@ def _convert(
     records += [(tables.MONITORS, monitored.statistics), (tables.MONITOR_DETAILS, monitored.details)]
     records += [(tables.SOLUTION, solution), (tables.PROTECTION, protection)]
     encoded = clock.time("table encode", lambda: [(schema, schema.encode(record)) for schema, record in records])
-    clock.time("table decode", lambda: [schema.decode(schema.label, table) for schema, table in encoded])
+    clock.time("table decode", lambda: [schema.decode(schema.label_of(table), table) for schema, table in encoded])
 
 
 def _step_figures(clock: _Clock) -> Iterator[Figure]:

@@ -81,7 +81,8 @@ def aircraft(flight: Flight, sent: list[tuple[Burst, ...]]) -> int:
 
 
 def _there_and_back(schema: Any, record: Record | None) -> None:
-    schema.decode(schema.label, schema.encode(record))
+    table = schema.encode(record)
+    schema.decode(schema.label_of(table), table)
 
 
 def _process(part: str, given: Any, **environment: str) -> subprocess.Popen[bytes]:

@@ -27,13 +27,17 @@ BASELINES = tuple((i, j) for i in _RECEIVERS for j in _RECEIVERS if i < j)
 def by_product(columns: str, unit: str, doc: str) -> Any:
     """Declare a field ``(product, satellite)``; `columns` is the pattern of the columns' names."""
     names = tuple(columns.format(product=product.name) for product in PRODUCTS)
-    return per_satellite(unit, doc, columns=names)
+    optional = tuple(columns.format(product=product.name) for product in PRODUCTS if product.optional)
+    return per_satellite(unit, doc, columns=names, optional=optional)
 
 
 def by_receiver(columns: str, unit: str, doc: str) -> Any:
     """Declare a field ``(product, reference receiver, satellite)``; `columns` is the pattern of the columns' names."""
-    names = tuple(columns.format(product=product.name, receiver=j) for product in PRODUCTS for j in _RECEIVERS)
-    return per_satellite(unit, doc, columns=names, leading=(len(PRODUCTS), MAX_REFERENCE_RECEIVERS))
+    every = [(product, columns.format(product=product.name, receiver=j)) for product in PRODUCTS for j in _RECEIVERS]
+    names = tuple(name for _, name in every)
+    optional = tuple(name for product, name in every if product.optional)
+    leading = (len(PRODUCTS), MAX_REFERENCE_RECEIVERS)
+    return per_satellite(unit, doc, columns=names, leading=leading, optional=optional)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -41,7 +45,8 @@ class IntegrityEpoch(Record):
     """Ground corrections of one epoch after monitoring: what may be broadcast, and why the rest may not.
 
     Corrections are NaN unless `state` is USABLE. Fields of corrections have the products of
-    :data:`~gbas_msgs_py.products.PRODUCTS` as their first axis; those that a station does not make are NaN.
+    :data:`~gbas_msgs_py.products.PRODUCTS` as their first axis; those that a station does not make are NaN. Of a
+    satellite that is USABLE a correction of a second frequency may be missing all the same; it is there or not as a whole.
     """
 
     n_receivers: float = scalar("-", "reference receivers in use")
