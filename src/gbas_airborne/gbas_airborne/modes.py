@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import lru_cache
-from typing import Final, NamedTuple, TypeVar
+from typing import Any, Final, NamedTuple, TypeVar, cast
 
 from gbas_airborne.params import ALL_MODES, AirborneParams
+from gbas_core.models.sigma_curves import CurveSignal, Part, sigma_curves
+from gbas_core.satellites import SYSTEM_MASKS
 from gbas_core.signals import BAND_INDEX
 from gbas_msgs_py import modes
 from gbas_msgs_py.codes import ServiceType, Signal
@@ -102,6 +104,10 @@ def bands_of(mode: Mode) -> tuple[int, ...]:
 
 
 T = TypeVar("T")
+MODEL_TAU_S: Final = 100.0
+"""Time constant of the airborne sigma models of the standard."""
+_PARTS: Final[tuple[Part, ...]] = ("noise", "multipath")
+_SYSTEM_LETTERS: Final = tuple(SYSTEM_MASKS)
 N_SIGNALS: Final = 2
 """The most signals a mode's range is combined of."""
 
@@ -118,16 +124,15 @@ class Processing(NamedTuple):
     ----------
     coefficient : tuple of float
         Factors of the signals in the range; 0 for one that is not there.
-    level_tau_s, iono_tau_s : float
-        Time constants that the levels' airborne sigma and sigma_iono are for [s].
-    model_tau_s : tuple of float
-        Time constant of each signal's airborne sigma model [s].
+    tau_s : tuple of float
+        Time constants the airborne sigma is for, of levels and of weights [s].
+    iono_tau_s : float
+        Time constant sigma_iono is for [s].
     """
 
     coefficient: tuple[float, float]
-    level_tau_s: float
+    tau_s: tuple[float, float]
     iono_tau_s: float
-    model_tau_s: tuple[float, float]
 
 
 @lru_cache(maxsize=64)
@@ -138,20 +143,68 @@ def processing_of(mode: Mode) -> Processing:
     """
     factors = tuple(factor for _, factor in mode.components)
     level_tau_s = mode.levels_smoothing_s or mode.smoothing_s
-    models = tuple(_model_tau_s(signal, mode) for signal, _ in mode.components)
     corrections_s = max(PRODUCTS[PRODUCT_INDEX[name]].smoothing_s for name in mode.products)
     return Processing(
         coefficient=(factors[0], factors[1] if len(factors) > 1 else 0.0),
-        level_tau_s=level_tau_s,
+        tau_s=(level_tau_s, mode.smoothing_s),
         iono_tau_s=max(level_tau_s, corrections_s),
-        model_tau_s=pair(models),
     )
 
 
-def _model_tau_s(signal: Signal, mode: Mode) -> float:
-    """Time constant of a signal's airborne sigma model: known is 100 s for L1 [s].
+class AirModel(NamedTuple):
+    """Airborne noise and multipath of a mode, for levels and for weights.
 
-    Circiu et al. find little between 100 s and 30 s on L5, and give a curve for each; the one surrogate we have is
-    taken for either.
+    Attributes
+    ----------
+    tau_s : (2, C) tuple
+        Time constant each signal's curves are for [s].
+    curves : (2, systems, C, 6) tuple
+        Coefficients a0, a1 [m] and theta0 [deg] of noise, and of multipath; systems as in CLOCK_GROUPS.
     """
-    return 100.0 if signal is Signal.L1 else mode.smoothing_s
+
+    tau_s: tuple[tuple[float, ...], ...]
+    curves: tuple[Any, ...]
+
+
+@lru_cache(maxsize=64)
+def air_model(mode: Mode, designator: str) -> AirModel:
+    """The curves of the suite's table for a mode; with a time constant below all of a signal, those of 100 s.
+
+    Raises
+    ------
+    ValueError
+        When the table has none, or a curve of several pieces.
+    """
+    families = [[_signal_curves(signal, tau, designator) for signal, _ in mode.components] for tau in _taus(mode)]
+    return AirModel(
+        tau_s=tuple(pair(tuple(tau for tau, _ in signals)) for signals in families),
+        curves=tuple(
+            tuple(pair(tuple(curves[system] for _, curves in signals)) for system in range(len(_SYSTEM_LETTERS)))
+            for signals in families
+        ),
+    )
+
+
+def _taus(mode: Mode) -> tuple[float, float]:
+    return processing_of(mode).tau_s
+
+
+def _signal_curves(signal: Signal, tau_s: float, designator: str) -> tuple[float, list[tuple[float, ...]]]:
+    """Time constant and coefficients, by system, of one signal."""
+    table, name = sigma_curves(), cast(CurveSignal, signal.name)
+    found: list[tuple[float, ...]] = []
+    for system in _SYSTEM_LETTERS:
+        parts = [
+            table.pieces("air", part, name, designator, tau_s, system)
+            or table.pieces("air", part, name, designator, MODEL_TAU_S, system)
+            for part in _PARTS
+        ]
+        if any(len(pieces) != 1 for pieces in parts) or len({pieces[0].smoothing_s for pieces in parts}) != 1:
+            raise ValueError(f"airborne curves of {name}, {tau_s:g} s, system {system}: expected one of noise and one "
+                             "of multipath, of one time constant")  # fmt: skip
+        rows = [pieces[0] for pieces in parts]
+        found.append(tuple(
+            number for row in rows for number in (row.scale * row.a0_m, row.scale * row.a1_m, row.theta0_deg)
+        ))  # fmt: skip
+        constant_s = rows[0].smoothing_s
+    return constant_s, found

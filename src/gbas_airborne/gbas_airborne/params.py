@@ -22,6 +22,7 @@ SECTION: Final = "airborne"
 NO_FAS: Final = -1
 MAX_RPDS: Final = 48
 ALL_MODES: Final = "all"
+OF_LEVELS: Final = "100 s"
 _MAX_STATION_ID: Final = 4
 
 
@@ -35,6 +36,10 @@ class ServiceDParams:
     protection_probability: Annotated[
         float, Parameter("probability the protection level multipliers of GAST-D are made from", "-", 1e-15, 1e-3)
     ] = 1.25e-10
+    weights: Annotated[
+        Literal["30 s", "100 s"],
+        Parameter("sigmas the positions are weighted with: those of the 30 s corrections, or those of the levels"),
+    ] = "30 s"
     low_timeout_s: Annotated[
         float, Parameter("guidance is lost without messages for this long below 200 ft", "s", 0.0, 3.5)
     ] = 1.5
@@ -104,7 +109,7 @@ class AirborneParams:
     ] = 230.0
     inflate_unsettled: Annotated[
         bool,
-        Parameter("scale airborne noise and multipath while the filter settles, and for a time constant below 100 s"),
+        Parameter("scale airborne noise and multipath while the filter settles, and for no smoothing"),
     ] = True
     max_gap_s: Annotated[
         float,

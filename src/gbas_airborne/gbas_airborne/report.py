@@ -4,13 +4,21 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from gbas_airborne.navigation.guidance import approach_columns, guidance_columns
 from gbas_airborne.navigation.kernels.report import COLUMNS, used_columns
 from gbas_airborne.navigation.locate import Located
 from gbas_airborne.navigation.position import Fix, PositionResult
+from gbas_airborne.ranging.corrected_ranges import RangingSources
 from gbas_airborne.reception.receive import Received
+from gbas_core.record import FloatArray
+from gbas_core.satellites import missing
+from gbas_msgs_py.codes import Rejection, ServiceType
 from gbas_msgs_py.modes import Mode
 from gbas_msgs_py.records import SolutionEpoch
 
@@ -28,12 +36,13 @@ def no_positions(received: Received, modes: tuple[Mode, ...]) -> tuple[SolutionE
 def _station_columns(received: Received, mode: Mode) -> dict[str, Any]:
     """What is known without a position."""
     station, sets = received.station, [received.corrections.get(name) for name in mode.products]
+    of_service_d = mode.service is ServiceType.D
     columns: dict[str, Any] = {
         "gps_week": received.gps_week,
         "tow_s": received.tow_s,
         "mode": float(mode.number),
         "gcid": float(station.gcid) if station is not None else math.nan,
-        "k_md_e": station.k_md_e if station is not None else math.nan,
+        "k_md_e": math.nan if station is None else station.k_md_e_d if of_service_d else station.k_md_e,
         **approach_columns(received.approach),
     }
     known = [each for each in sets if each is not None]
@@ -61,17 +70,35 @@ def _position_columns(fix: Fix) -> dict[str, Any]:
         "z_m": z_m,
         # that of the first constellation used
         "clock_m": next(each for each in fix.clock_m.tolist() if math.isfinite(each)),
-        # no mode yet compares two positions
-        "d_vert_m": 0.0,
-        "d_lat_m": 0.0,
     }
 
 
 def _satellite_columns(received: Received, result: PositionResult, fix: Fix) -> dict[str, Any]:
     """Rows of the satellites used, and how many of them and of receivers there are."""
     tan_gpa = math.tan(received.approach.gpa_rad) if received.approach is not None else 0.0
+    checks = received.checks.columns
+    if result.sources.mode.service is ServiceType.D:
+        checks = np.stack([*checks[:2], received.p_d if received.p_d is not None else missing()])
     rows, n_sats, n_receivers = used_columns(
-        result.reason, fix.sky, fix.projection, tan_gpa, result.sources.applied, received.checks.columns, fix.distance_m
+        result.reason, fix.sky, fix.projection, tan_gpa, result.sources.applied, checks, fix.distance_m
     )
     columns: dict[str, Any] = dict(zip(COLUMNS, rows, strict=False))
+    columns["d_vert_m"], columns["d_lat_m"] = separation_m(result.sources, result.reason, columns)
     return {**columns, "b_m": rows[len(COLUMNS) :], "n_sats": float(n_sats), "n_receivers": float(n_receivers)}
+
+
+def separation_m(
+    sources: RangingSources, reason: NDArray[np.int64], columns: Mapping[str, FloatArray]
+) -> tuple[float, float]:
+    """D_V and D_L: how far the solution of the mode beside is from this one, with the same projections [m].
+
+    0 for a mode without one; NaN where a satellite used lacks its range.
+
+    Source: RTCA DO-253D (dual solution), |sum s_i (PR30_i - PR100_i)|.
+    """
+    if not sources.mode.beside:
+        return 0.0, 0.0
+    used = reason == int(Rejection.NONE)
+    difference_m = (sources.range_m - sources.beside_m)[used]
+    vertical, lateral = (float((columns[name][used] * difference_m).sum()) for name in ("s_vert", "s_lat"))
+    return abs(vertical), abs(lateral)

@@ -16,24 +16,23 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gbas_airborne.modes import pair, processing_of
-from gbas_airborne.navigation.kernels.position import ELEVATION, RANGE_ERROR, Conditions, tested_positions
-from gbas_airborne.params import AirborneParams
+from gbas_airborne.modes import air_model, processing_of
+from gbas_airborne.navigation.kernels.position import (
+    ELEVATION,
+    LEVELS,
+    RANGE_ERROR,
+    WEIGHTS,
+    Conditions,
+    tested_positions,
+)
+from gbas_airborne.params import OF_LEVELS, AirborneParams
 from gbas_airborne.ranging.corrected_ranges import RangingSources
 from gbas_airborne.reception.columns import SIGMA
 from gbas_airborne.reception.station_data import StationData
-from gbas_core.models.error_models import (
-    AAD_A,
-    AAD_B,
-    AIRFRAME_MULTIPATH,
-    L5_MULTIPATH_SURROGATE,
-    L5_NOISE_SURROGATE,
-    AirborneCurve,
-)
 from gbas_core.positioning.approach import FinalApproach
 from gbas_core.record import FloatArray, IntArray
 from gbas_core.satellites import CLOCK_GROUPS
-from gbas_msgs_py.codes import Signal
+from gbas_msgs_py.codes import ServiceType
 from gbas_msgs_py.modes import Mode
 
 GROUP: Final[IntArray] = CLOCK_GROUPS.argmax(axis=0)
@@ -135,7 +134,7 @@ def find_positions(
         np.array(recent),
         np.array([each.prior.dt_s for each in inputs]),
         np.array([processing_of(each.sources.mode).coefficient for each in inputs]),
-        np.array([_curves(each.sources.mode, params.aad) for each in inputs]),
+        _curves(tuple(each.sources.mode for each in inputs), params),
         np.array([_iono(each.sources.mode, station) for each in inputs]),
         approach.rot_approach_ecef if approach is not None else _NO_APPROACH,
         GROUP,
@@ -163,25 +162,20 @@ def find_positions(
     ]
 
 
-@lru_cache(maxsize=64)
-def _curves(mode: Mode, aad: str) -> tuple[tuple[float, ...], ...]:
-    """Coefficients of airborne noise and multipath of the signals of a mode; those of L5 are surrogates."""
-    noise_l1 = AAD_A if aad == "A" else AAD_B
-    known = {Signal.L1: (noise_l1, AIRFRAME_MULTIPATH)}
-    of_l5 = (L5_NOISE_SURROGATE, L5_MULTIPATH_SURROGATE)
-    rows = tuple(
-        sum((_coefficients(curve) for curve in known.get(signal, of_l5)), start=()) for signal, _ in mode.components
-    )
-    return pair(rows)
-
-
-def _coefficients(curve: AirborneCurve) -> tuple[float, ...]:
-    return curve.a0_m, curve.a1_m, curve.theta0_deg
+@lru_cache(maxsize=8)
+def _curves(modes: tuple[Mode, ...], params: AirborneParams) -> FloatArray:
+    """Curves of airborne noise and multipath of modes, (M, 2, groups, C, 6)."""
+    curves: FloatArray = np.array([air_model(mode, params.aad).curves for mode in modes])
+    for row, mode in enumerate(modes):
+        if mode.levels and params.gast_d.weights == OF_LEVELS:
+            curves[row, WEIGHTS] = curves[row, LEVELS]
+    return curves
 
 
 def _iono(mode: Mode, station: StationData) -> tuple[float, float, float]:
     """sigma_vig, ionospheric delay over that on L1, and time constant."""
-    return float(station.sigma_vig), mode.iono_factor, processing_of(mode).iono_tau_s
+    gradient = station.sigma_vig_d if mode.service is ServiceType.D else station.sigma_vig
+    return float(gradient), mode.iono_factor, processing_of(mode).iono_tau_s
 
 
 def _conditions(station: StationData, params: AirborneParams) -> Conditions:

@@ -17,11 +17,11 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from gbas_airborne.modes import N_SIGNALS, pair, processing_of
-from gbas_airborne.params import AirborneParams
+from gbas_airborne.modes import N_SIGNALS, air_model, pair, processing_of
+from gbas_airborne.params import OF_LEVELS, AirborneParams
 from gbas_airborne.ranging.kernels.corrected_ranges import correct_ranges
 from gbas_airborne.ranging.own_ranges import SmoothedRanges, Tracked
-from gbas_airborne.reception.columns import B_VALUES
+from gbas_airborne.reception.columns import B_VALUES, SIGMA
 from gbas_airborne.reception.receive import Received
 from gbas_core.gnss.ephemeris import Ephemeris
 from gbas_core.record import BoolArray, FloatArray
@@ -205,8 +205,8 @@ def _sources(
         np.array([[(each.code_m, each.smoothed_m, each.settled_s) for each in pair(signals)] for signals in measured]),
         np.array([each.coefficient for each in processing]),
         np.array([mode.smoothing_s for mode in modes]),
-        np.array([each.level_tau_s for each in processing]),
-        np.array([each.model_tau_s for each in processing]),
+        np.array([each.tau_s[0] for each in processing]),
+        np.array([air_model(mode, params.aad).tau_s for mode in modes]),
         place,
         np.array([[products.index(name) for name in pair(mode.level_products)] for mode in modes]),
         np.array([each.columns for each in sets]),
@@ -222,6 +222,9 @@ def _sources(
         float(params.settle_s),
         bool(params.inflate_unsettled),
     )
+    for row, mode in enumerate(modes):
+        if mode.levels and params.gast_d.weights == OF_LEVELS:
+            weight_sigma_m[row], factor[row, 1] = applied[row, SIGMA], factor[row, 0]
     return {
         mode.number: RangingSources(
             mode=mode,

@@ -15,6 +15,7 @@ from typing import Final
 
 from gbas_airborne.modes import PRODUCT_OF_MEASUREMENT
 from gbas_airborne.params import NO_FAS, AirborneParams
+from gbas_airborne.reception.service_d import joined, with_decorrelation
 from gbas_airborne.reception.station_data import (
     EphemerisChecks,
     correction_set,
@@ -76,6 +77,7 @@ def reception_step(
     intake.count(failed=malformed)
     for burst in ready:
         intake.take(burst)
+        intake.join_type11()
     intake.expire()
     return intake.finished(), intake.events.all()
 
@@ -245,6 +247,11 @@ class _VdbMessageProcessor:
         kept = tuple(m for m in kept if m.modified_z_count_s == message.modified_z_count_s)
         self.state.type11 = (*kept, message)
         self.state.type11_frame = frame
+        self.state.p_d = with_decorrelation(self.state.p_d, message)
+
+    def join_type11(self) -> None:
+        """Corrections of GAST-D, where messages of both types of one instant are there."""
+        self.state.corrections = joined(self.state.corrections, self.state.type11, self.state.type11_frame)
 
     def _drop_pending(self) -> None:
         """Half of a linked pair whose other half did not come is never used."""

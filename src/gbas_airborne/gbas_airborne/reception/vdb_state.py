@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from gbas_airborne.reception.station_data import Corrections, EphemerisChecks, StationData
 from gbas_core.positioning.approach import FinalApproach
+from gbas_core.record import FloatArray
 from gbas_vdb.messages.types import Type1, Type2, Type11
 from gbas_vdb.transmission.burst import Burst
 
@@ -46,6 +47,8 @@ class ReceptionState:
         First half of a linked pair, and the frame it came in.
     type11, type11_frame
         The 30 s corrections of one frame, and which.
+    p_d : (N_SATS,) array or None
+        P_D as type 11 messages sent it [m/m].
     """
 
     station_id: str | None = None
@@ -61,5 +64,6 @@ class ReceptionState:
     pending_frame: tuple[int, float] | None = None
     type11: tuple[Type11, ...] = ()
     type11_frame: tuple[int, float] | None = None
+    p_d: FloatArray | None = None
     waiting: tuple[Burst, ...] = ()
     counts: Counts = field(default_factory=Counts)

@@ -76,8 +76,8 @@ class ErrorModel(NamedTuple):
     ----------
     coefficient : (C,) array
         Factors of the signals in the range; 0 for one that is not there.
-    curves : (C, 6) array
-        Coefficients a0, a1 [m] and theta0 [deg] of airborne noise, and of multipath.
+    curves : (2, groups, C, 6) array
+        Coefficients a0, a1 [m] and theta0 [deg] of airborne noise, and of multipath; for levels and for weights.
     gradient : float
         sigma_vig on L1 [m/m].
     iono_factor, tau_s : float
@@ -92,26 +92,28 @@ class ErrorModel(NamedTuple):
 
 
 @compiled
-def air_sigma_m(theta_deg, models, noise_factor, s):
-    """Airborne noise and multipath of a range, for levels and for weights [m]; signals are independent."""
-    coefficient, curves = models.coefficient, models.curves
-    levels = weights = 0.0
+def air_sigma_m(theta_deg, coefficient, curves, noise_factor, s):
+    """Airborne noise and multipath of a range [m]; signals are independent.
+
+    Factors and curves of the signals ``(C,)``, ``(C, 6)``; factors on their sigmas ``(C, N)``.
+    """
+    total = 0.0
     for c in range(coefficient.shape[0]):
         if coefficient[c] == 0.0:
             continue
         a = curves[c]
         own_m = np.hypot(model.curve_m(theta_deg, a[0], a[1], a[2]), model.curve_m(theta_deg, a[3], a[4], a[5]))
         if coefficient[1] == 0.0:
-            return own_m * noise_factor[LEVELS, c, s], own_m * noise_factor[WEIGHTS, c, s]
-        levels += (coefficient[c] * own_m * noise_factor[LEVELS, c, s]) ** 2
-        weights += (coefficient[c] * own_m * noise_factor[WEIGHTS, c, s]) ** 2
-    return np.sqrt(levels), np.sqrt(weights)
+            return own_m * noise_factor[c, s]
+        total += (coefficient[c] * own_m * noise_factor[c, s]) ** 2
+    return np.sqrt(total)
 
 
 @compiled
 def look(
-    position_m, reference_m, satellite_m, noise_factor, sigma_gnd_m, previous_m, dt_s, models, given, sky, los, rot
-):
+    position_m, reference_m, satellite_m, noise_factor, sigma_gnd_m, previous_m, dt_s, models, group, given, sky, los,
+    rot,
+):  # fmt: skip
     """Fill in the sky at a position, lines of sight ``(3, N)`` and local axes; returns the distance to the station."""
     latitude, longitude, height_m = geodetic(position_m[0], position_m[1], position_m[2])
     fill_enu(latitude, longitude, rot)
@@ -132,7 +134,9 @@ def look(
         theta_deg = np.rad2deg(elevation)
         if not theta_deg >= np.rad2deg(given.mask_rad) - EDGE_DEG:
             continue
-        air_m, air_weight_m = air_sigma_m(theta_deg, models, noise_factor, s)
+        curves = models.curves[:, group[s]]
+        air_m = air_sigma_m(theta_deg, models.coefficient, curves[LEVELS], noise_factor[LEVELS], s)
+        air_weight_m = air_sigma_m(theta_deg, models.coefficient, curves[WEIGHTS], noise_factor[WEIGHTS], s)
         sine = np.sin(np.deg2rad(theta_deg))
         tropo_m = abs(model.tropo_m(given.refractivity_uncertainty, scale_m, sine, above_m))
         iono_m = models.iono_factor * model.iono_m(
@@ -233,8 +237,8 @@ def solve(
     distance_m = np.nan
     for _ in range(given.max_iterations):
         distance_m = look(
-            position_m, reference_m, satellite_m, noise_factor, sigma_gnd_m, previous_m, dt_s, models, given, sky,
-            los_ecef, rot_enu,
+            position_m, reference_m, satellite_m, noise_factor, sigma_gnd_m, previous_m, dt_s, models, group,
+            given, sky, los_ecef, rot_enu,
         )  # fmt: skip
         add_reasons(source_reason, range_m, sky, distance_m, given, reason)
         if np.isnan(rot_approach[0, 0]):
@@ -275,7 +279,7 @@ def tested_positions(
     reference_m : (3,) array
     dt_s : (M,) array
         Time since the previous position [s].
-    coefficient, curves, iono : (M, C), (M, C, 6), (M, 3) arrays
+    coefficient, curves, iono : (M, C), (M, 2, groups, C, 6), (M, 3) arrays
         Fields of :class:`ErrorModel`, the last three of them in ``iono``.
     rot_approach : (3, 3) array
     group : (N,) int array

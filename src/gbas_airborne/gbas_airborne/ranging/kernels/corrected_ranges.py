@@ -187,8 +187,8 @@ def correct_ranges(
         Factors; 0 for a signal that is not there.
     tau_s, level_tau_s : (M,) arrays
         Time constant of the ranges, and the one the levels' sigmas are for [s].
-    model_tau_s : (M, C) array
-        Time constant the airborne sigma models are for [s].
+    model_tau_s : (M, 2, C) array
+        Time constant the airborne sigma models of levels and of weights are for [s].
     product, level_product : (M, C) arrays
         Which of the P sets of corrections is applied, and which has the sigma of the levels.
     corrections, age_s : (P, rows, N), (P,) arrays
@@ -229,8 +229,8 @@ def correct_ranges(
                 if reason[m, s] == _NONE and not np.isfinite(corrections[level_product[m, c], SIGMA, s]):
                     reason[m, s] = _INVALID
                 if inflate:
-                    factor[m, 0, c, s] = settling_factor(since_s, level_tau_s[m], model_tau_s[m, c])
-                    factor[m, 1, c, s] = settling_factor(since_s, tau_s[m], model_tau_s[m, c])
+                    factor[m, 0, c, s] = settling_factor(since_s, level_tau_s[m], model_tau_s[m, 0, c])
+                    factor[m, 1, c, s] = settling_factor(since_s, tau_s[m], model_tau_s[m, 1, c])
                 code_m = measured[m, c, 0, s]
                 if not np.isfinite(code_m + own[p, _OWN_IOD, s]):
                     total_m = np.nan
