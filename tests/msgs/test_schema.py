@@ -116,7 +116,9 @@ def test_only_satellites_with_values_have_rows_and_keep_the_order_of_the_axis() 
 
 def test_rows_may_come_in_any_order() -> None:
     schema, table = tables.OBSERVATIONS, table_of()
-    assert bits(schema.decode(schema.label_of(table), table[::-1])) == bits(schema.decode(schema.label_of(table), table))
+    assert bits(schema.decode(schema.label_of(table), table[::-1])) == bits(
+        schema.decode(schema.label_of(table), table)
+    )
 
 
 def test_columns_are_those_of_the_contract() -> None:
@@ -151,7 +153,8 @@ def test_optional_columns_are_last_and_only_where_they_say_something() -> None:
     codec = TableCodec(schema)
     for record in (full, without):
         again = codec.decode(codec.encode(record))
-        assert again is not None and bits(again) == bits(record)
+        assert again is not None
+        assert bits(again) == bits(record)
 
 
 def test_label_names_schema_version_and_columns() -> None:

@@ -15,7 +15,6 @@ import numpy as np
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import CLOCK_GROUPS, N_SATS, SAT_IDS
 from gbas_ground.corrections.kernels import consistency as kernels
-from gbas_ground.corrections.sigma import measured_sigma_m
 from gbas_ground.exclusions import Latch, exclude, initial_latch
 from gbas_ground.monitors.monitor_table import MonitorSummary, Summaries
 from gbas_ground.params import GroundParams
@@ -46,6 +45,8 @@ class CorrectionInputs:
     judged : (N,) bool array
         Satellites that every required monitor of signals could judge.
     elevation_rad : (N,) array
+    sigma_m : (k, N) array
+        What the sigmas are made of (:func:`~gbas_ground.corrections.kernels.consistency.broadcast_sigmas_m`) [m].
     """
 
     correction_m: FloatArray
@@ -54,6 +55,7 @@ class CorrectionInputs:
     settled: BoolArray
     judged: BoolArray
     elevation_rad: FloatArray
+    sigma_m: FloatArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -139,10 +141,10 @@ class Checks(NamedTuple):
     due: BoolArray
     n_failed: int
 
-    def summaries(self) -> Summaries:
+    def summaries(self, signal: Signal = Signal.L1) -> Summaries:
         """What they say of each satellite."""
         rows = zip(_TESTS, self.statistic, self.threshold, self.failed, self.due, strict=True)
-        return {key: MonitorSummary(value, limit, failed, due, Signal.L1) for key, value, limit, failed, due in rows}
+        return {key: MonitorSummary(value, limit, failed, due, signal) for key, value, limit, failed, due in rows}
 
 
 def form_corrections(
@@ -153,7 +155,7 @@ def form_corrections(
     usable = kernels.usable_channels(given.settled, given.judged, exclusions.channels.cause, exclusions.receivers.cause)
     made = Corrections(*kernels.form_corrections(
         given.correction_m, given.previous_m, given.dt_s, usable, exclusions.satellites.cause, given.elevation_rad,
-        measured_sigma_m(station.params, given.elevation_rad), settings,
+        given.sigma_m, settings,
     ))  # fmt: skip
     checks = kernels.summarise_corrections(
         made.used, made.count, made.prc_m, made.rrc_mps, made.b_m, made.channel_sigma_m, settings

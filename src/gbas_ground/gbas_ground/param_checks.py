@@ -11,6 +11,7 @@ from gbas_ground.claims.gradient_claim import refuse_smaller as refuse_smaller_g
 from gbas_ground.claims.limits import MAX_M_EIG, MAX_Y_EIG_M
 from gbas_ground.claims.orbit_claim import refuse_smaller as refuse_smaller_decorrelation
 from gbas_ground.monitors.false_alarm import FALSE_EXCLUSION
+from gbas_ground.second_band import second_band_of
 from gbas_ground.sections import GCID_UNHEALTHY
 from gbas_vdb.errors import VdbError
 from gbas_vdb.transmission.schedule import sources_that_fit
@@ -42,6 +43,7 @@ def check_station(params: GroundParams) -> None:
     """
     _check_receivers(params)
     _check_sigma_table(params)
+    second_band_of(params)
     _check_false_exclusions(params)
     _check_messages(params)
     _check_orbit_claim(params)

@@ -50,6 +50,7 @@ from gbas_ground.sections import (
     GastDSection,
     MonitorsSection,
     ReceiversSection,
+    SecondBandSection,
     SmoothingSection,
     StationSection,
     VdbSection,
@@ -119,6 +120,7 @@ class GroundParams:
     gast_d: GastDSection = GastDSection()
     vdb: VdbSection = VdbSection()
     smoothing: SmoothingSection = SmoothingSection()
+    second_band: SecondBandSection = SecondBandSection()
     ionosphere: IonosphereSection = IonosphereSection()
     approaches: Approaches = ()
 

@@ -12,7 +12,7 @@ from gbas_core.ranging.channel_filter import ChannelFilterParams
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import satellites_of
 from gbas_ground.channels.predicted_ranges import Site, site_of
-from gbas_ground.channels.tracking import filter_params
+from gbas_ground.channels.tracking import SMOOTHED_BANDS, filter_params
 from gbas_ground.claims.limits import MAX_DECORRELATION
 from gbas_ground.claims.orbit_claim import OrbitSite, orbit_bound
 from gbas_ground.corrections.kernels.consistency import Settings
@@ -28,6 +28,7 @@ from gbas_ground.monitors.gradient_coverage import GradientSite, gradient_site
 from gbas_ground.monitors.ionosphere_gradient import IonosphereGradientParams
 from gbas_ground.monitors.shared_receiver import Planes, planes_of
 from gbas_ground.params import GroundParams
+from gbas_ground.second_band import BAND, SecondBandSettings, second_band_of
 from gbas_vdb.messages.types import FasDataSet, Type2
 from gbas_vdb.transmission.frame import ScheduleParams
 from gbas_vdb.transmission.schedule import sources_that_fit
@@ -66,7 +67,12 @@ class PreparedStation:
     @cached_property
     def filters(self) -> ChannelFilterParams:
         """Settings of the channels' filters."""
-        return filter_params(self.params)
+        return filter_params(self.params, SMOOTHED_BANDS if self.second is None else (*SMOOTHED_BANDS, BAND))
+
+    @cached_property
+    def second(self) -> SecondBandSettings | None:
+        """What the second band is made with; None of a station that corrects one only."""
+        return second_band_of(self.params)
 
     @cached_property
     def consistency(self) -> Settings:

@@ -101,7 +101,9 @@ class TableCodec(Generic[R]):
     def message(self, table: FloatArray) -> bytes:
         """Message of a table."""
         rows, columns = table.shape
-        head = self._layouts[self.schema.label_of(table)].filled(((rows, rows * columns), (columns, columns)), rows * columns)
+        head = self._layouts[self.schema.label_of(table)].filled(
+            ((rows, rows * columns), (columns, columns)), rows * columns
+        )
         return bytes(head + table.astype("<f8", copy=False).tobytes())
 
     def decode(self, data: bytes) -> R | None:

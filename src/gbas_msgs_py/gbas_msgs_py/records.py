@@ -45,8 +45,8 @@ class IntegrityEpoch(Record):
     """Ground corrections of one epoch after monitoring: what may be broadcast, and why the rest may not.
 
     Corrections are NaN unless `state` is USABLE. Fields of corrections have the products of
-    :data:`~gbas_msgs_py.products.PRODUCTS` as their first axis; those that a station does not make are NaN. Of a
-    satellite that is USABLE a correction of a second frequency may be missing all the same; it is there or not as a whole.
+    :data:`~gbas_msgs_py.products.PRODUCTS` as their first axis; those that a station does not make are NaN. Those of
+    a second frequency may be missing of a satellite that is USABLE; they are there or not as a whole.
     """
 
     n_receivers: float = scalar("-", "reference receivers in use")

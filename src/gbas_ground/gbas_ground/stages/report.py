@@ -14,10 +14,11 @@ from gbas_ground.prepared import PreparedStation
 from gbas_ground.stages.channel_table import channel_epoch
 from gbas_ground.stages.correct import Corrected
 from gbas_ground.stages.decide import Decided
-from gbas_ground.stages.integrity_table import integrity_of
+from gbas_ground.stages.integrity_table import integrity_of, with_second_band
 from gbas_ground.stages.kernels.status import used_of_usable
 from gbas_ground.stages.receive import GroundEpoch
 from gbas_ground.stages.satellite_status import SatelliteStatus
+from gbas_ground.stages.second_band import SecondBand
 from gbas_msgs_py.codes import EventKind, ExclusionCause
 from gbas_msgs_py.events import Event, EventLog
 from gbas_msgs_py.records import ChannelEpoch, IntegrityEpoch, MonitorDetailEpoch, MonitorEpoch
@@ -68,7 +69,9 @@ class ReportState:
     channels: FloatArray
 
 
-def report(state: ReportState, decided: Decided, station: PreparedStation) -> tuple[ReportState, StationReport]:
+def report(
+    state: ReportState, decided: Decided, second: SecondBand | None, station: PreparedStation
+) -> tuple[ReportState, StationReport]:
     """Tables and events of one epoch."""
     corrected, status = decided.corrected, decided.status
     tracked, signals = corrected.monitored.tracked, corrected.monitored.signals
@@ -76,6 +79,8 @@ def report(state: ReportState, decided: Decided, station: PreparedStation) -> tu
     time = now.gps_week, now.tow_s
     used, contributing = used_of_usable(corrected.corrections.used, status.state)
     integrity = integrity_of(decided, used, int(np.count_nonzero(contributing)), station.params)
+    if second is not None and station.second is not None:
+        integrity = with_second_band(integrity, second, station.second)
     table, channels = channel_epoch(decided, state.channels)
     serving = bool(status.usable.any())
     _contribution_events(state.contributing, contributing, corrected, now.events)
@@ -84,7 +89,7 @@ def report(state: ReportState, decided: Decided, station: PreparedStation) -> tu
     summaries = {**tracked.summaries, **signals.summaries, **corrected.summaries}
     made = StationReport(
         integrity=integrity,
-        statistics=monitor_epoch(*time, summaries, shown),
+        statistics=monitor_epoch(*time, summaries, shown, {} if second is None else second.summaries),
         details=monitor_detail_epoch(*time, signals.details, shown),
         channels=channels,
         events=now.events.all(),
