@@ -14,6 +14,7 @@ from typing import Annotated, Any, Final, Literal
 
 from gbas_core.configuration import read_configuration
 from gbas_core.parameters import Parameter, ParameterError, from_mapping, parameters
+from gbas_core.ranging.divergence import AIRBORNE, AIRBORNE_THRESHOLD_MPS
 from gbas_core.ranging.slips import NORMAL_MANOEUVRE_JERK_MPS3
 from gbas_msgs_py import modes
 from gbas_vdb.transmission.burst import SLOT_NAMES
@@ -30,7 +31,9 @@ _MAX_STATION_ID: Final = 4
 class ServiceDParams:
     """GAST-D: what its protection levels and monitors are set to.
 
-    Sources: RTCA DO-253D by way of published descriptions; uncertain are all limits but those of the divergence.
+    Sources: RTCA DO-253D by way of published descriptions; time constant and limit of the divergence are those of
+    Jiang, Milner, Macabiau, ENC 2015. Known are 2 m, 200 m and the time-outs; uncertain are K_fd_B, the limits of
+    projections (ceilings recommended to aircraft), the gate, and all times of holding and clearing, which are ours.
     """
 
     protection_probability: Annotated[
@@ -43,6 +46,49 @@ class ServiceDParams:
     low_timeout_s: Annotated[
         float, Parameter("guidance is lost without messages for this long below 200 ft", "s", 0.0, 3.5)
     ] = 1.5
+    require_authentication: Annotated[
+        bool, Parameter("no GAST-D without authentication of the station's slots (see authentication)")
+    ] = True
+    divergence_mps: Annotated[
+        float, Parameter("a satellite whose code and carrier drift apart faster is not used", "m/s", 0.0, 1.0)
+    ] = AIRBORNE_THRESHOLD_MPS
+    divergence_tau_s: Annotated[float, Parameter("time constant of both filters of that rate", "s", 1.0, 1000.0)] = (
+        AIRBORNE.tau_s
+    )
+    divergence_settle_s: Annotated[
+        float, Parameter("time these filters have to run before a satellite is used", "s", 0.0, 3600.0)
+    ] = AIRBORNE.settle_s
+    divergence_clear_s: Annotated[
+        float, Parameter("an excluded satellite is used again when the rate was small for this long", "s", 0.0, 3600.0)
+    ] = 100.0
+    dual_solution_m: Annotated[
+        float, Parameter("largest difference of 30 s and 100 s solutions, vertically and laterally", "m", 0.0, 100.0)
+    ] = 2.0
+    k_fd_b: Annotated[
+        float, Parameter("threshold of the B values in the position over their sigma (RRFM)", "-", 1.0, 20.0)
+    ] = 5.26
+    exclusions: Annotated[int, Parameter("satellites that may be left out so that both of these pass", "-", 0, 3)] = 1
+    exclusion_hold_s: Annotated[
+        float, Parameter("a satellite left out is not tried again for this long", "s", 0.0, 3600.0)
+    ] = 60.0
+    correction_shift_m: Annotated[
+        float, Parameter("most that the 100 s corrections may move the position horizontally", "m", 0.0, 10000.0)
+    ] = 200.0
+    s_vert: Annotated[
+        float, Parameter("largest vertical projection of a satellite that the aircraft allows", "-", 0.1, 100.0)
+    ] = 4.0
+    s_vert_pair: Annotated[float, Parameter("largest sum of those of two satellites", "-", 0.1, 100.0)] = 6.0
+    s_lat: Annotated[
+        float, Parameter("largest lateral projection of a satellite that the aircraft allows", "-", 0.1, 100.0)
+    ] = 4.0
+    s_lat_pair: Annotated[float, Parameter("largest sum of those of two satellites", "-", 0.1, 100.0)] = 6.0
+    step_in_s: Annotated[
+        float, Parameter("a satellite is used when it has been usable for this long", "s", 0.0, 3600.0)
+    ] = 50.0
+    upgrade_gate_m: Annotated[
+        float,
+        Parameter("nearer to the threshold no better service is taken up again", "m", 0.0, 100000.0),
+    ] = 7500.0
 
 
 @parameters

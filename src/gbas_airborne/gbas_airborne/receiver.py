@@ -15,21 +15,22 @@ States are frozen and know no clock: the same inputs give the same outputs, bit 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from gbas_airborne.modes import configured_modes
 from gbas_airborne.navigation.locate import LocateState, locate
+from gbas_airborne.navigation.position import Withheld
 from gbas_airborne.params import AirborneParams
 from gbas_airborne.ranging.corrected_ranges import CorrectState, correct
-from gbas_airborne.ranging.own_ranges import track
+from gbas_airborne.ranging.own_ranges import TrackState, track
 from gbas_airborne.reception.receive import AirborneEpoch, ReceiveState, receive
 from gbas_airborne.report import no_positions, report
 from gbas_airborne.selection import Selected, SelectionState, select
 from gbas_airborne.service import ServiceState, service_step
 from gbas_core.gnss.epoch_order import Arrival
-from gbas_core.ranging.channel_filter import ChannelFilterState
 from gbas_msgs_py.events import Event
 from gbas_msgs_py.records import ModesEpoch, ProtectionEpoch, SolutionEpoch
 
@@ -39,7 +40,7 @@ class PositionState:
     """What positioning remembers between epochs, stage by stage."""
 
     reception: ReceiveState = field(default_factory=ReceiveState)
-    tracking: ChannelFilterState | None = None
+    tracking: TrackState | None = None
     correction: CorrectState = field(default_factory=CorrectState)
     location: LocateState = field(default_factory=LocateState)
     selection: SelectionState = field(default_factory=SelectionState)
@@ -118,12 +119,14 @@ def _position(state: PositionState, epoch: AirborneEpoch, params: AirborneParams
     if received.arrival is Arrival.RESTART:
         state = PositionState()
     located, solutions, events = state, no_positions(received, modes), received.events
+    withheld: Mapping[int, Withheld] = {}
     if received.observations is not None:
         tracking, tracked = track(state.tracking, received, modes, params)
         correction, corrected = correct(state.correction, tracked, modes, params)
         location, found = locate(state.location, corrected, params)
         located = replace(state, tracking=tracking, correction=correction, location=location)
         solutions, events = report(found), events + found.events
-    selection, selected = select(state.selection, solutions, params)
+        withheld = {each.sources.mode.number: each.withheld for each in found.results if each.withheld is not None}
+    selection, selected = select(state.selection, solutions, withheld, params)
     state = replace(located, reception=reception, selection=selection)
     return state, replace(selected, events=events + selected.events)

@@ -4,21 +4,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gbas_airborne.navigation.guidance import approach_columns, guidance_columns
 from gbas_airborne.navigation.kernels.report import COLUMNS, used_columns
 from gbas_airborne.navigation.locate import Located
 from gbas_airborne.navigation.position import Fix, PositionResult
-from gbas_airborne.ranging.corrected_ranges import RangingSources
+from gbas_airborne.navigation.service_d import projected, separation_m
 from gbas_airborne.reception.receive import Received
-from gbas_core.record import FloatArray
 from gbas_core.satellites import missing
-from gbas_msgs_py.codes import Rejection, ServiceType
+from gbas_msgs_py.codes import ServiceType
 from gbas_msgs_py.modes import Mode
 from gbas_msgs_py.records import SolutionEpoch
 
@@ -83,22 +80,6 @@ def _satellite_columns(received: Received, result: PositionResult, fix: Fix) -> 
         result.reason, fix.sky, fix.projection, tan_gpa, result.sources.applied, checks, fix.distance_m
     )
     columns: dict[str, Any] = dict(zip(COLUMNS, rows, strict=False))
-    columns["d_vert_m"], columns["d_lat_m"] = separation_m(result.sources, result.reason, columns)
+    found = projected(result, received.approach)
+    columns["d_vert_m"], columns["d_lat_m"] = separation_m(found) if found is not None else (math.nan, math.nan)
     return {**columns, "b_m": rows[len(COLUMNS) :], "n_sats": float(n_sats), "n_receivers": float(n_receivers)}
-
-
-def separation_m(
-    sources: RangingSources, reason: NDArray[np.int64], columns: Mapping[str, FloatArray]
-) -> tuple[float, float]:
-    """D_V and D_L: how far the solution of the mode beside is from this one, with the same projections [m].
-
-    0 for a mode without one; NaN where a satellite used lacks its range.
-
-    Source: RTCA DO-253D (dual solution), |sum s_i (PR30_i - PR100_i)|.
-    """
-    if not sources.mode.beside:
-        return 0.0, 0.0
-    used = reason == int(Rejection.NONE)
-    difference_m = (sources.range_m - sources.beside_m)[used]
-    vertical, lateral = (float((columns[name][used] * difference_m).sum()) for name in ("s_vert", "s_lat"))
-    return abs(vertical), abs(lateral)

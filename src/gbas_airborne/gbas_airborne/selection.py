@@ -12,11 +12,12 @@ from typing import Final
 
 import numpy as np
 
-from gbas_airborne.conditions import Evaluation, evaluate
+from gbas_airborne.conditions import Evaluation, Failure, evaluate
 from gbas_airborne.modes import configured_modes, guiding_modes
+from gbas_airborne.navigation.position import Withheld
 from gbas_airborne.params import AirborneParams
 from gbas_airborne.service import ServiceState, next_state, protection_of
-from gbas_msgs_py.codes import EventKind, ServiceCause, ServiceType
+from gbas_msgs_py.codes import ApproachState, EventKind, ServiceCause, ServiceType
 from gbas_msgs_py.events import Event, EventLog
 from gbas_msgs_py.modes import mode_of
 from gbas_msgs_py.records import ModesEpoch, ProtectionEpoch, SolutionEpoch
@@ -32,10 +33,13 @@ class SelectionState:
     ----------
     guiding : int or None
         Number of the mode that guides; None before the first epoch.
+    served : int or None
+        Number of the mode that last gave guidance with its service.
     services : mapping from a mode's number to ServiceState
     """
 
     guiding: int | None = None
+    served: int | None = None
     services: Mapping[int, ServiceState] = field(default_factory=dict)
 
 
@@ -60,16 +64,24 @@ class Selected:
 
 
 def select(
-    state: SelectionState, solutions: tuple[SolutionEpoch, ...], params: AirborneParams
+    state: SelectionState,
+    solutions: tuple[SolutionEpoch, ...],
+    withheld: Mapping[int, Withheld],
+    params: AirborneParams,
 ) -> tuple[SelectionState, Selected]:
     """Choose the solution that guides, from those of the configured modes in their order.
 
-    One mode is not evaluated here: there is nothing to choose.
+    `withheld` are causes, by number of the mode, that solutions have no position for. One mode is not evaluated here:
+    there is nothing to choose.
     """
     if len(configured_modes(params)) == 1:
         return state, Selected(solutions=solutions)
-    evaluations = {int(each.mode): found for each, found in zip(solutions, evaluate(solutions, params), strict=True)}
+    evaluations = {
+        int(each.mode): _with_cause(found, withheld.get(int(each.mode)))
+        for each, found in zip(solutions, evaluate(solutions, params), strict=True)
+    }
     chain = [mode.number for mode in guiding_modes(params)]
+    _hold_back(state.served, chain, evaluations, {int(each.mode): each for each in solutions}, params)
     guiding = _best(chain, evaluations)
     services = {
         int(each.mode): next_state(
@@ -85,7 +97,35 @@ def select(
         modes=_table(solutions, evaluations, services, guiding),
         events=_changes(state.guiding, guiding, chain, evaluations, solutions[0]),
     )
-    return SelectionState(guiding=guiding, services=services), selected
+    served = guiding if evaluations[guiding].failure is None else state.served
+    return SelectionState(guiding=guiding, served=served, services=services), selected
+
+
+def _with_cause(evaluation: Evaluation, withheld: Withheld | None) -> Evaluation:
+    """The evaluation of a solution without a position, with the cause of that."""
+    failure = evaluation.failure
+    if withheld is None or failure is None or failure.cause is not ServiceCause.NO_POSITION:
+        return evaluation
+    return evaluation._replace(failure=Failure(failure.state, *withheld))
+
+
+def _hold_back(
+    served: int | None,
+    chain: list[int],
+    evaluations: dict[int, Evaluation],
+    solutions: Mapping[int, SolutionEpoch],
+    params: AirborneParams,
+) -> None:
+    """Inside the final segment a mode better than the one that served last is not taken up; without an approach there
+    is no final segment.
+    """
+    if served not in chain:
+        return
+    for number in chain[: chain.index(served)]:
+        distance_m, gate_m = solutions[number].distance_to_ltp_m, params.gast_d.upgrade_gate_m
+        if evaluations[number].failure is None and distance_m < gate_m:
+            held = Failure(ApproachState.DIFFERENTIAL, ServiceCause.FINAL_SEGMENT, distance_m, gate_m)
+            evaluations[number] = evaluations[number]._replace(failure=held)
 
 
 def _best(chain: list[int], evaluations: Mapping[int, Evaluation]) -> int:
@@ -93,7 +133,13 @@ def _best(chain: list[int], evaluations: Mapping[int, Evaluation]) -> int:
     for number in chain:
         if evaluations[number].failure is None:
             return number
-    return next((number for number in chain if np.isfinite(evaluations[number].levels.level_m).all()), chain[-1])
+    return next((number for number in chain if _has_levels(evaluations[number])), chain[-1])
+
+
+def _has_levels(evaluation: Evaluation) -> bool:
+    """Whether there are levels, and nothing that the node of the protection levels could not know of."""
+    held_back = evaluation.failure is not None and evaluation.failure.cause is ServiceCause.FINAL_SEGMENT
+    return not held_back and bool(np.isfinite(evaluation.levels.level_m).all())
 
 
 def _changes(

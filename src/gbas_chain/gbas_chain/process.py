@@ -371,6 +371,8 @@ def _airborne_values(request: ProcessRequest, recording: Recording, ground: Grou
         "station_data_timeout_s": min(max(60.0, 30.0 * interval_s), 3600.0),  # they come round in 20 epochs
         "use_unhealthy": True,  # without a service; a station that claims one is not affected
     }
+    if request.station is None:
+        values["gast_d"] = {"require_authentication": False}  # of a station that claims nothing
     if ground.approaches:
         values["rpds"] = ground.approaches[0].rpds
     return {**values, **given}

@@ -32,7 +32,7 @@ from gbas_airborne.reception.station_data import StationData
 from gbas_core.positioning.approach import FinalApproach
 from gbas_core.record import FloatArray, IntArray
 from gbas_core.satellites import CLOCK_GROUPS
-from gbas_msgs_py.codes import ServiceType
+from gbas_msgs_py.codes import ServiceCause, ServiceType
 from gbas_msgs_py.modes import Mode
 
 GROUP: Final[IntArray] = CLOCK_GROUPS.argmax(axis=0)
@@ -91,6 +91,14 @@ class Fix:
     projection: FloatArray
 
 
+class Withheld(NamedTuple):
+    """Why a position that was found is not used: the cause, the number and its bound."""
+
+    cause: ServiceCause
+    value: float
+    threshold: float
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PositionResult:
     """What became of the search for a position.
@@ -107,7 +115,12 @@ class PositionResult:
     range_error_m : (N_SATS,) array or None
         Error of the satellites the range test excluded [m]; NaN for others.
     fix : Fix or None
-        None with too few satellites, too weak a geometry, without convergence, or when the range test cannot be passed.
+        None with too few satellites, too weak a geometry, without convergence, when the range test cannot be passed, or
+        when it is withheld.
+    withheld : Withheld or None
+        What stands against the position.
+    failed : Withheld or None
+        That, or what stood against the position before satellites were left out.
     """
 
     sources: RangingSources
@@ -116,6 +129,8 @@ class PositionResult:
     elevation_rad: FloatArray | None = None
     range_error_m: FloatArray | None = None
     fix: Fix | None = None
+    withheld: Withheld | None = None
+    failed: Withheld | None = None
 
 
 def find_positions(

@@ -17,10 +17,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from gbas_airborne.modes import N_SIGNALS, air_model, pair, processing_of
+from gbas_airborne.modes import N_SIGNALS, air_model, bands_of, pair, processing_of
 from gbas_airborne.params import OF_LEVELS, AirborneParams
 from gbas_airborne.ranging.kernels.corrected_ranges import correct_ranges
-from gbas_airborne.ranging.own_ranges import SmoothedRanges, Tracked
+from gbas_airborne.ranging.own_ranges import DIVERGENCE, SmoothedRanges, Tracked
 from gbas_airborne.reception.columns import B_VALUES, SIGMA
 from gbas_airborne.reception.receive import Received
 from gbas_core.gnss.ephemeris import Ephemeris
@@ -81,8 +81,10 @@ class RangingSources:
         Age of the corrections, of the older ones of two signals [s]; NaN without corrections.
     own_crc : (N_SATS,) array
         CRC of the ephemeris the receiver has for the correction; NaN where it has none.
-    beside_m : (N_SATS,) array
-        Range of the mode beside this one [m]; NaN for modes without.
+    beside : RangingSources or None
+        Those of the mode beside this one.
+    divergence_mps : (N_SATS,) array
+        Filtered rate of code minus carrier, where it is monitored [m/s].
     """
 
     mode: Mode
@@ -95,7 +97,8 @@ class RangingSources:
     settled_s: FloatArray
     age_s: float
     own_crc: FloatArray
-    beside_m: FloatArray = field(default_factory=missing)
+    beside: RangingSources | None = None
+    divergence_mps: FloatArray = field(default_factory=missing)
 
     @property
     def corrected(self) -> bool:
@@ -128,7 +131,7 @@ def correct(
     sources = {mode.number: _without_station(mode, ranges[mode.number]) for mode in modes if mode not in corrected}
     if corrected:
         sources |= _sources(corrected, ranges, products, matched, received, params)
-    found = tuple(_with_beside(sources[mode.number], sources, modes) for mode in modes)
+    found = tuple(_without_divergence(_with_beside(sources[mode.number], sources, modes), tracked) for mode in modes)
     return CorrectState(matched={**state.matched, **matched}), Corrected(received=received, sources=found)
 
 
@@ -146,7 +149,19 @@ def _with_beside(
         return sources
     beside = all_sources[next(each.number for each in modes if each.name == mode.same_systems(mode.beside))]
     reason = np.where(sources.reason == int(Rejection.NONE), beside.reason, sources.reason)
-    return replace(sources, reason=reason, beside_m=beside.range_m)
+    return replace(sources, reason=reason, beside=beside)
+
+
+def _without_divergence(sources: RangingSources, tracked: Tracked) -> RangingSources:
+    """The sources of a mode that needs the divergence monitor: what it excludes, or cannot judge yet, is not used."""
+    found = tracked.divergence
+    if DIVERGENCE not in sources.mode.monitors or found is None:
+        return sources
+    bands = list(bands_of(sources.mode))
+    excluded, counts = found.excluded[bands].any(axis=0), found.counts[bands].all(axis=0)
+    why = np.where(excluded, int(Rejection.DIVERGENCE), int(Rejection.NOT_SETTLED))
+    reason = np.where((sources.reason == int(Rejection.NONE)) & (excluded | ~counts), why, sources.reason)
+    return replace(sources, reason=reason, divergence_mps=found.rate_mps[bands[0]])
 
 
 def _match(before: OwnEphemerides | None, product: str, received: Received) -> OwnEphemerides:
