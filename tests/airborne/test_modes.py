@@ -20,7 +20,13 @@ from gbas_msgs_py.modes import Mode, mode_of
 
 PARAMS = AirborneParams(settle_s=5.0, inflate_unsettled=False)
 TOY = Mode(
-    number=77, name="toy", signal=Signal.L1, smoothing_s=30.0, products=("l1_100",), service=ServiceType.C, doc="a test's"
+    number=77,
+    name="toy",
+    signal=Signal.L1,
+    smoothing_s=30.0,
+    products=("l1_100",),
+    service=ServiceType.C,
+    doc="a test's",
 )
 RAMP_MPS = 0.1
 

@@ -169,7 +169,8 @@ monitors.MONITORS += (toy,)
 monitors.TESTS[99, 1] = (toy, test)
 products.PRODUCTS += (products.Product(name="l5_60", signal=Signal.L5, smoothing_s=60.0, message_type=12, doc="toy"),)
 from gbas_msgs_py import modes
-values = {"signal": Signal.L5, "smoothing_s": 60.0, "products": ("l5_60",), "service": modes.MODES[0].service, "doc": "toy"}
+values = {"signal": Signal.L5, "smoothing_s": 60.0, "products": ("l5_60",), "doc": "toy"}
+values["service"] = modes.MODES[0].service
 modes.PRODUCT_INDEX["l5_60"] = 2
 modes.MODES += (modes.Mode(number=99, name="l5_60", **values),)
 import numpy as np
