@@ -7,13 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gbas_airborne.params import AirborneParams
+from gbas_airborne.reception.vdb_messages import reception_step
+from gbas_airborne.reception.vdb_state import ReceptionState
 from gbas_core.models.sigma_curves import sigma_gnd_m
 from gbas_core.parameters import ParameterError
 from gbas_core.satellites import IS_GALILEO, IS_GPS, N_SATS, SAT_INDEX
 from gbas_core.signals import IONO_RATIO, L1, L5
-from gbas_ground.station import GroundStation
+from gbas_ground.station import GroundEpoch, GroundStation
 from gbas_msgs_py.codes import ChannelState
 from gbas_msgs_py.products import L1_30, L1_100, L5_30, L5_100
+from gbas_vdb.transmission.receive import decode_burst
 from ground_runs import half_seconds, params, run
 from synthetic_ranges import truth
 
@@ -231,6 +235,84 @@ def test_only_what_is_asked_for_is_made():
         assert np.isnan(getattr(last, name)[L5_100]).all()
 
 
+# --- over the air
+
+
+def blocks(bursts):
+    decoded = [decode_burst(burst) for burst in bursts]
+    assert not any(each.errors for each in decoded)
+    return [block for each in decoded for block in each.blocks]
+
+
+def heard(out):
+    """What a receiver knows after all frames of a run."""
+    state, events = ReceptionState(), []
+    for bursts in out.bursts:
+        for burst in bursts:
+            state, told = reception_step(state, (burst,), burst.gps_week, burst.tow_s + 0.5, AirborneParams())
+            events.extend(told)
+    return state, events
+
+
+def test_what_the_station_makes_arrives_in_the_air(two_bands):
+    """Within half of the last bit of a message; sigmas rounded up (ICAO Annex 10 vol. I, table B-63)."""
+    out = two_bands[2]
+    last, (state, events) = out.integrity[-1], heard(out)
+    for name, product in zip(BOTH, (L5_100, L5_30), strict=True):
+        received = state.corrections[name]
+        there = on_l5(last)
+        assert np.array_equal(np.isfinite(received.listed), there)
+        assert np.abs(received.prc_m - last.prc_m[product])[there].max() <= 0.005 + 1e-9
+        assert np.abs(received.rrc_mps - last.rrc_mps[product])[there].max() <= 0.0005 + 1e-9
+        over = (received.sigma_m - last.sigma_pr_gnd_m[product])[there]
+        assert -1e-9 <= over.min() <= over.max() < 0.02
+        assert np.nanmax(np.abs(received.b_m - last.b_m[product])[:, there]) <= 0.025 + 1e-9
+        assert np.array_equal(received.iod[there], last.iod[there] % 256)
+        assert (received.gps_week, received.tow_s) == (last.gps_week, last.tow_s)
+    assert {event.cause for event in events} == {
+        "station_selected",
+        "gcid_changed",
+    }  # healthy once there are corrections
+    assert state.counts.unpaired == state.counts.failed == 0
+
+
+def test_a_receiver_of_one_band_gets_the_same_messages(two_bands):
+    """Types 1 and 11 to the bit, in every frame; what else there is has a type that it does not look into."""
+    _, _, out, one = two_bands
+    for with_l5, without in zip(out.bursts, one.bursts, strict=True):
+        of_both = [[each for each in blocks(bursts) if each.message_type in (1, 11)] for bursts in (with_l5, without)]
+        assert of_both[0] == of_both[1]
+        assert {each.message_type for each in blocks(without)} <= {1, 2, 11}
+        assert {each.message_type for each in blocks(with_l5)} <= {1, 2, 8, 11}
+
+
+def test_what_does_not_fit_is_the_lowest_and_is_told():
+    """Three slots hold types 1 and 11 of all, and not all of L5 beside them."""
+    two = station(gast_d__enabled=True, vdb__slots="ABC")
+    out = run(truth(4), two, half_seconds(20), change=both_bands())
+    last, received = out.integrity[-1], heard(out)[0].corrections["l5_100"]
+    there, sent = on_l5(last), np.isfinite(received.listed)
+    assert 4 <= sent.sum() < there.sum()
+    assert last.elevation_rad[sent].min() > last.elevation_rad[there & ~sent].max()
+    (event,) = [each for each in out.events if each.cause == "no_room"]
+    assert (event.subject, event.value, event.threshold) == ("station/l5", there.sum(), sent.sum())
+    # types 1 and 11 still carry every satellite
+    assert sum(len(each.message.measurements) for each in blocks(out.bursts[-1]) if each.message_type == 1) == 19
+
+
+def test_satellites_that_do_not_fit_on_l1_are_told_too():
+    out = run(truth(4), params(4, vdb__slots="A"), half_seconds(20))
+    n = usable(out.integrity[-1]).sum()
+    (event,) = [each for each in out.events if each.cause == "no_room"]
+    assert (event.subject, event.value) == ("station", n)
+    assert event.threshold < n
+
+
+def test_slots_that_hold_no_second_band_are_refused():
+    with pytest.raises(ParameterError, match=r"vdb.slots = 'A' leaves room for \d satellites of second_band.products"):
+        station(vdb__slots="A", gast_d__enabled=True)
+
+
 def test_parameters():
     with pytest.raises(ParameterError, match="'l2_100' is not one of l5_100, l5_30"):
         params(4, second_band__products=("l2_100",))
@@ -251,8 +333,6 @@ def test_state_is_pure():
     world, ready = truth(3), GroundStation(station(3))
     out = run(world, station(3), half_seconds(12), change=both_bands())
     observed = both_bands()(6.0, world.observe(2300, 302_406.0))
-    from gbas_ground.station import GroundEpoch
-
     epoch = GroundEpoch(gps_week=2300, tow_s=302_406.0, observations=observed)
     first, second = (ready.step(out.state, epoch)[1].integrity.prc_m.tobytes() for _ in range(2))
     assert first == second

@@ -14,7 +14,7 @@ from gbas_ground.monitors.false_alarm import FALSE_EXCLUSION
 from gbas_ground.second_band import second_band_of
 from gbas_ground.sections import GCID_UNHEALTHY
 from gbas_vdb.errors import VdbError
-from gbas_vdb.transmission.schedule import sources_that_fit
+from gbas_vdb.transmission.schedule import further_sources_that_fit, sources_that_fit
 
 if TYPE_CHECKING:
     from gbas_ground.params import GroundParams
@@ -106,6 +106,16 @@ def _check_messages(params: GroundParams) -> None:
         raise ParameterError(f"cannot be broadcast: {error}") from None
     if room < MIN_SERVICE_SATELLITES:
         raise ParameterError(f"vdb.slots = {params.vdb.slots!r} leaves room for {room} satellites; 4 are needed")
+    kinds = params.private_kinds()
+    if not kinds:
+        return
+    given = params.station_message(), params.approach_messages(), params.schedule()
+    room = further_sources_that_fit(MIN_SERVICE_SATELLITES, kinds, *given)
+    if room < MIN_SERVICE_SATELLITES:
+        raise ParameterError(
+            f"vdb.slots = {params.vdb.slots!r} leaves room for {max(room, 0)} satellites of second_band.products = "
+            f"{', '.join(params.second_band.products)} beside 4 on L1; 4 are needed"
+        )
 
 
 def _check_orbit_claim(params: GroundParams) -> None:

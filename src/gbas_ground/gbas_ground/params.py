@@ -55,6 +55,7 @@ from gbas_ground.sections import (
     StationSection,
     VdbSection,
 )
+from gbas_msgs_py.products import PRODUCTS
 from gbas_vdb.messages.block import encode_body
 from gbas_vdb.messages.path_point import trusted_path_point
 from gbas_vdb.messages.types import AdditionalBlock1, AdditionalBlock3, AdditionalBlock4, FasDataSet, Type2, Type4
@@ -260,6 +261,10 @@ class GroundParams:
             period_frames=self.vdb.period_frames,
             occupancy_min=self.vdb.occupancy_min,
         )
+
+    def private_kinds(self) -> tuple[int, ...]:
+        """Measurement types of the messages with corrections of a second band."""
+        return tuple(product.measurement_type for product in PRODUCTS if product.name in self.second_band.products)
 
     # --- files
 

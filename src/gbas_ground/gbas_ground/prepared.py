@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -31,16 +31,35 @@ from gbas_ground.params import GroundParams
 from gbas_ground.second_band import BAND, SecondBandSettings, second_band_of
 from gbas_vdb.messages.types import FasDataSet, Type2
 from gbas_vdb.transmission.frame import ScheduleParams
-from gbas_vdb.transmission.schedule import sources_that_fit
+from gbas_vdb.transmission.schedule import further_sources_that_fit, sources_that_fit
 
 
 class FrameSettings(NamedTuple):
-    """What every frame is made with: station data, approaches, schedule, and how many satellites fit."""
+    """What every frame is made with: station data, approaches, schedule, and how many satellites fit.
+
+    `kinds` are the measurement types of the messages with corrections of a second band.
+    """
 
     station: Type2
     approaches: tuple[FasDataSet, ...]
     schedule: ScheduleParams
     room: int
+    kinds: tuple[int, ...]
+
+    def second_room(self, n_satellites: int) -> int:
+        """How many satellites fit with a second band beside so many; -1 where not even a message without any does."""
+        return _second_room(n_satellites, self.kinds, self.station, self.approaches, self.schedule)
+
+
+@lru_cache(maxsize=256)
+def _second_room(
+    n_satellites: int,
+    kinds: tuple[int, ...],
+    station: Type2,
+    approaches: tuple[FasDataSet, ...],
+    schedule: ScheduleParams,
+) -> int:
+    return further_sources_that_fit(n_satellites, kinds, station, approaches, schedule)
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +103,7 @@ class PreparedStation:
         """What every frame is made with."""
         params = self.params
         given = params.station_message(), params.approach_messages(), params.schedule()
-        return FrameSettings(*given, room=sources_that_fit(*given))
+        return FrameSettings(*given, room=sources_that_fit(*given), kinds=params.private_kinds())
 
     @cached_property
     def places(self) -> Places | None:

@@ -8,9 +8,10 @@ import numpy as np
 
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import SAT_IDS
-from gbas_ground.broadcast import empty_integrity
+from gbas_ground.broadcast import empty_integrity, fitting
 from gbas_ground.monitors.monitor_table import monitor_detail_epoch, monitor_epoch
 from gbas_ground.prepared import PreparedStation
+from gbas_ground.second_band import SUFFIX
 from gbas_ground.stages.channel_table import channel_epoch
 from gbas_ground.stages.correct import Corrected
 from gbas_ground.stages.decide import Decided
@@ -61,12 +62,15 @@ class ReportState:
         Whether there were corrections.
     channels : array
         The executive's table, of :func:`~gbas_ground.stages.channel_table.channel_epoch`.
+    left_out : tuple of int
+        Satellites for which the frame had no room, on the first band and on the second.
     """
 
     status: SatelliteStatus
     contributing: BoolArray
     serving: bool
     channels: FloatArray
+    left_out: tuple[int, int] = (0, 0)
 
 
 def report(
@@ -85,6 +89,7 @@ def report(
     serving = bool(status.usable.any())
     _contribution_events(state.contributing, contributing, corrected, now.events)
     _satellite_events(state, decided, serving, now.events)
+    left_out = _room_events(state.left_out, integrity, status, station, now.events)
     shown = np.isfinite(integrity.state)
     summaries = {**tracked.summaries, **signals.summaries, **corrected.summaries}
     made = StationReport(
@@ -94,7 +99,29 @@ def report(
         channels=channels,
         events=now.events.all(),
     )
-    return ReportState(status=status, contributing=contributing, serving=serving, channels=table), made
+    after = ReportState(status=status, contributing=contributing, serving=serving, channels=table, left_out=left_out)
+    return after, made
+
+
+def _room_events(
+    before: tuple[int, int], integrity: IntegrityEpoch, status: SatelliteStatus, station: PreparedStation,
+    events: EventLog,
+) -> tuple[int, int]:  # fmt: skip
+    """Say when satellites are left out for want of room, by how many, and when all fit again; value: those there are,
+    threshold: those that fit."""
+    if station.second is None and np.count_nonzero(status.usable) <= station.frames.room:
+        left_out, counts, rooms = (0, 0), (0, 0), (station.frames.room, 0)
+    else:
+        sent = fitting(integrity, station)
+        left_out = sent.left_out, sent.second_left_out
+        counts = len(sent.satellites) + left_out[0], len(sent.second) + left_out[1]
+        rooms = sent.room, max(sent.second_room, 0)
+    for subject, was, now, count, room in zip(
+        ("station", "station" + SUFFIX), before, left_out, counts, rooms, strict=True
+    ):
+        if was != now:
+            events.add(EventKind.STATION, subject, "no_room" if now else "room_for_all", float(count), float(room))
+    return left_out
 
 
 def refusal(epoch: GroundEpoch, events: EventLog) -> StationReport:
