@@ -180,8 +180,8 @@ class GastDSection:
     required: Annotated[
         bool,
         Parameter(
-            "satellites that the gradient and the orbit monitor cannot judge are not used; false, for recorded data, only "
-            "where the station says that it is not healthy"
+            "satellites that the gradient and the orbit monitor cannot judge are not used; false, for recorded data, "
+            "only where the station says that it is not healthy"
         ),
     ] = True
     y_eig_m: Annotated[float, Parameter("ionospheric error at the station", "m", 0.0, MAX_Y_EIG_M)] = MAX_Y_EIG_M
