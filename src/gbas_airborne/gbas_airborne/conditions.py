@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import Final, NamedTuple
 
 from gbas_airborne.modes import configured_modes
@@ -47,18 +46,13 @@ class Failure(NamedTuple):
 
 
 class Evaluation(NamedTuple):
-    """What a solution is worth; without levels and limits these are NaN."""
+    """What a solution is worth; without levels and limits these are NaN. The service is the one its mode can give."""
 
     levels: ProtectionLevels
     val_m: float
     lal_m: float
     failure: Failure | None
-
-
-@lru_cache(maxsize=64)
-def mode_numbered(number: float, params: AirborneParams) -> Mode | None:
-    """The mode of a number, as configured; None for another."""
-    return next((mode for mode in configured_modes(params) if mode.number == number), None)
+    service: ServiceType
 
 
 def evaluate(solutions: Sequence[SolutionEpoch], params: AirborneParams) -> tuple[Evaluation, ...]:
@@ -67,7 +61,8 @@ def evaluate(solutions: Sequence[SolutionEpoch], params: AirborneParams) -> tupl
     Protection levels are NaN unless messages, station and position are all good; with `params.use_unhealthy` the
     station need not be, and with a service that this station or approach is not for there are levels, too.
     """
-    modes = [mode_numbered(solution.mode, params) for solution in solutions]
+    known = {mode.number: mode for mode in configured_modes(params)}
+    modes = [known.get(_number(solution.mode)) for solution in solutions]
     failures = [
         _message_failure(solution, mode, params) or _position_failure(solution, mode, params)
         for solution, mode in zip(solutions, modes, strict=True)
@@ -84,8 +79,13 @@ def evaluate(solutions: Sequence[SolutionEpoch], params: AirborneParams) -> tupl
                 or _service_failure(solution, mode, params)
                 or _protection_failure(protected, val_m, lal_m, params)
             )
-        found.append(Evaluation(protected, val_m, lal_m, failure))
+        found.append(Evaluation(protected, val_m, lal_m, failure, ServiceType.NONE if mode is None else mode.service))
     return tuple(found)
+
+
+def _number(mode: float) -> int:
+    """Number of a mode in a table; none has 0."""
+    return int(mode) if math.isfinite(mode) and mode == int(mode) else 0
 
 
 def _levels(known: list[tuple[SolutionEpoch, Mode | None]], params: AirborneParams) -> tuple[ProtectionLevels, ...]:

@@ -85,7 +85,7 @@ def select(
     guiding = _best(chain, evaluations)
     services = {
         int(each.mode): next_state(
-            state.services.get(int(each.mode), ServiceState()), each, evaluations[int(each.mode)].failure, params
+            state.services.get(int(each.mode), ServiceState()), each, evaluations[int(each.mode)]
         )
         for each in solutions
     }

@@ -9,9 +9,9 @@ import math
 from dataclasses import dataclass, replace
 from typing import Final
 
-from gbas_airborne.conditions import Evaluation, Failure, evaluate, mode_numbered
+from gbas_airborne.conditions import Evaluation, Failure, evaluate
 from gbas_airborne.params import AirborneParams
-from gbas_msgs_py.codes import ApproachState, EventKind, ServiceCause, ServiceType
+from gbas_msgs_py.codes import ApproachState, EventKind, ServiceType
 from gbas_msgs_py.events import Event, EventLog
 from gbas_msgs_py.records import ProtectionEpoch, SolutionEpoch
 
@@ -50,7 +50,7 @@ def service_step(
         One for each change of state, service and cause of alert.
     """
     evaluation = evaluate((solution,), params)[0]
-    new = next_state(state, solution, evaluation.failure, params)
+    new = next_state(state, solution, evaluation)
     return new, protection_of(solution, evaluation, new), _events(state, new, solution, evaluation.failure)
 
 
@@ -77,16 +77,13 @@ def protection_of(solution: SolutionEpoch, evaluation: Evaluation, state: Servic
     )
 
 
-def next_state(
-    state: ServiceState, solution: SolutionEpoch, failure: Failure | None, params: AirborneParams
-) -> ServiceState:
-    """State after a solution, with what does not hold of it."""
-    mode = mode_numbered(solution.mode, params)
-    if failure is None and mode is not None:
+def next_state(state: ServiceState, solution: SolutionEpoch, evaluation: Evaluation) -> ServiceState:
+    """State after a solution and what it is worth."""
+    failure = evaluation.failure
+    if failure is None:
         on_path = math.isfinite(solution.lateral_ddm + solution.vertical_ddm)
         approach = ApproachState.APPROACH if on_path else ApproachState.DIFFERENTIAL
-        return ServiceState(state=approach, service=mode.service, cause="", served=True)
-    failure = failure or Failure(ApproachState.DATA_VALID, ServiceCause.MODE_WITHOUT_SERVICE, math.nan, math.nan)
+        return ServiceState(state=approach, service=evaluation.service, cause="", served=True)
     lost = ApproachState.LOSS if state.served else failure.state
     return replace(state, state=lost, service=ServiceType.NONE, cause=failure.cause.word)
 

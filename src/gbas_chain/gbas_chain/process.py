@@ -158,6 +158,7 @@ def prepare(request: ProcessRequest) -> Prepared:
             f"--ground-xyz: {len(request.ground_xyz_m)} positions for {len(request.ground)} ground files; "
             "expected one each"
         )
+    _wanted(request)
     recording = Recording.open(
         request.ground,
         request.user,
@@ -317,10 +318,14 @@ def _service_values(service: str) -> dict[str, Any]:
     return {"service": "C", "modes": [ALL_MODES]} if service == ALL_SERVICES else {"service": service}
 
 
+def _wanted(request: ProcessRequest) -> AirborneParams:
+    """A receiver of the service asked for, before anything is read."""
+    return AirborneParams.from_mapping(_service_values(request.service), source="--service")
+
+
 def _make_corrections(request: ProcessRequest, sections: dict[str, dict[str, Any]]) -> None:
     """Let the station make and send what the modes need, where its file does not say; it may use every slot then."""
-    wanted = AirborneParams.from_mapping(_service_values(request.service), source="--service")
-    products = {name for mode in configured_modes(wanted) for name in mode.products}
+    products = {name for mode in configured_modes(_wanted(request)) for name in mode.products}
     second = sorted(name for name in products if PRODUCTS[PRODUCT_INDEX[name]].signal is Signal.L5)
     if "l1_30" in products:
         # a station that is taken for one claims nothing, so it need not have the monitors behind the claims

@@ -20,7 +20,7 @@ from gbas_airborne.reception.columns import B_VALUES, IOD
 from gbas_airborne.reception.receive import Received
 from gbas_airborne.reception.station_data import StationData
 from gbas_airborne.reception.vdb_messages import SOURCE
-from gbas_core.record import FloatArray
+from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import SAT_IDS
 from gbas_msgs_py.codes import EventKind, Rejection, ServiceCause, ServiceType
 from gbas_msgs_py.events import Event, EventLog
@@ -132,7 +132,9 @@ def _not_for_service_d(station: StationData, params: AirborneParams) -> Withheld
 
 
 def _with_usable(before: ModePosition, sources: RangingSources, received: Received) -> ModePosition:
-    """The memory with the time since which each satellite is usable."""
+    """The memory with the time since which each satellite is usable, where the mode needs it."""
+    if STEP_IN not in sources.mode.monitors:
+        return before
     usable = sources.reason == int(Rejection.NONE)
     since_ms = np.where(usable, np.minimum(before.usable_since_ms, received.epoch_ms), np.inf)
     return replace(before, usable_since_ms=since_ms)
@@ -163,12 +165,15 @@ def _prior(before: ModePosition, received: Received, station: StationData, param
 
 def _after(before: ModePosition, received: Received, result: PositionResult, params: AirborneParams) -> ModePosition:
     until_ms, reason = before.held_until_ms, before.held_reason
-    tripped = np.isfinite(result.range_error_m) if result.range_error_m is not None else np.zeros(len(SAT_IDS), bool)
-    left_out = np.isin(result.reason, _LEFT_OUT) & (until_ms <= received.epoch_ms)
-    for which, hold_s in ((tripped, params.range_test_hold_s), (left_out, params.gast_d.exclusion_hold_s)):
-        if which.any():
-            until_ms = np.where(which, received.epoch_ms + 1000.0 * hold_s, until_ms)
-            reason = np.where(which, result.reason, reason)
+    held: list[tuple[BoolArray, float]] = []
+    if result.range_error_m is not None and (tripped := np.isfinite(result.range_error_m)).any():
+        held.append((tripped, params.range_test_hold_s))
+    if result.failed is not None:
+        left_out = np.isin(result.reason, _LEFT_OUT) & (until_ms <= received.epoch_ms)
+        held.append((left_out, params.gast_d.exclusion_hold_s))
+    for which, hold_s in held:
+        until_ms = np.where(which, received.epoch_ms + 1000.0 * hold_s, until_ms)
+        reason = np.where(which, result.reason, reason)
     fix_ms, fix_m = before.fix_ms, before.fix_m
     if result.fix is not None:
         fix_ms, fix_m = received.epoch_ms, result.fix.position_m

@@ -127,6 +127,9 @@ def look(
     gradient = models.gradient if known else np.nan
     for s in range(satellite_m.shape[1]):
         sky[:, s] = np.nan
+        if np.isnan(satellite_m[0, s]):
+            los[0, s] = los[1, s] = los[2, s] = np.nan
+            continue
         range_m, x, y, z = rotated_range(position_m, satellite_m[0, s], satellite_m[1, s], satellite_m[2, s])
         los[0, s], los[1, s], los[2, s] = x, y, z
         azimuth, elevation = azimuth_elevation(rot, x, y, z)

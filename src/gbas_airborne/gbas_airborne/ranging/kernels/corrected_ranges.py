@@ -170,6 +170,29 @@ def agree(corrections, first, second, s):
 
 
 @compiled
+def places(measured, product, own, gps_week, tow_s):
+    """Satellite positions ``(P, 3, N)`` and clocks ``(P, N)`` for sets of corrections, by raw code of their signals.
+
+    Arguments as of :func:`correct_ranges`; a product is of one signal, so any mode that applies it has its code.
+    """
+    n_products, n_sats = own.shape[0], own.shape[2]
+    at_m, clock_s = np.full((n_products, 3, n_sats), np.nan), np.full((n_products, n_sats), np.nan)
+    done = np.zeros(n_products, np.bool_)
+    for m in range(product.shape[0]):
+        for c in range(product.shape[1]):
+            p = product[m, c]
+            if done[p]:
+                continue
+            done[p] = True
+            for s in range(n_sats):
+                code_m = measured[m, c, 0, s]
+                if np.isfinite(code_m + own[p, _OWN_IOD, s]):
+                    x, y, z, clock_s[p, s] = transmit_place(own[p], s, gps_week, tow_s, code_m, L1)
+                    at_m[p, 0, s], at_m[p, 1, s], at_m[p, 2, s] = x, y, z
+    return at_m, clock_s
+
+
+@compiled
 def correct_ranges(
     measured, coefficient, tau_s, level_tau_s, model_tau_s, product, level_product, corrections, age_s, own, own_crc,
     checks, systems, gps_week, tow_s, n_receivers, timeout_s, settle_s, inflate,
@@ -213,6 +236,7 @@ def correct_ranges(
     single = np.zeros(corrections.shape[0], np.bool_)
     for p in range(corrections.shape[0]):
         single[p] = single_receiver(corrections[p], n_receivers)
+    at_m, clock_s = places(measured, product, own, gps_week, tow_s)
     for m in range(n_modes):
         two = coefficient[m, 1] != 0.0
         for s in range(n_sats):
@@ -231,17 +255,11 @@ def correct_ranges(
                 if inflate:
                     factor[m, 0, c, s] = settling_factor(since_s, level_tau_s[m], model_tau_s[m, 0, c])
                     factor[m, 1, c, s] = settling_factor(since_s, tau_s[m], model_tau_s[m, 1, c])
-                code_m = measured[m, c, 0, s]
-                if not np.isfinite(code_m + own[p, _OWN_IOD, s]):
-                    total_m = np.nan
-                    continue
-                x, y, z, clock_s = transmit_place(own[p], s, gps_week, tow_s, code_m, L1)
                 range_m = corrected_range_m(
-                    smoothed_m, corrections[p, PRC, s], corrections[p, RRC, s], age_s[p], clock_s
+                    smoothed_m, corrections[p, PRC, s], corrections[p, RRC, s], age_s[p], clock_s[p, s]
                 )
                 total_m = total_m + coefficient[m, c] * range_m if two else range_m
-                if c == 0:
-                    place_m[m, 0, s], place_m[m, 1, s], place_m[m, 2, s] = x, y, z
+            place_m[m, :, s] = at_m[product[m, 0], :, s]
             if two and reason[m, s] == _NONE and not agree(corrections, product[m, 0], product[m, 1], s):
                 reason[m, s] = _B_VALUES
             ranges_m[m, s] = total_m
