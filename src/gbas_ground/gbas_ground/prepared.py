@@ -16,6 +16,7 @@ from gbas_ground.channels.tracking import SMOOTHED_BANDS, filter_params
 from gbas_ground.claims.limits import MAX_DECORRELATION
 from gbas_ground.claims.orbit_claim import OrbitSite, orbit_bound
 from gbas_ground.corrections.kernels.consistency import Settings
+from gbas_ground.corrections.second_band import BAND, SecondBandSettings, second_band_of
 from gbas_ground.corrections.sigma import settings_of
 from gbas_ground.ionosphere.places import Places, places_of
 from gbas_ground.monitors.carrier_acceleration import CarrierAccelerationParams
@@ -28,7 +29,6 @@ from gbas_ground.monitors.gradient_coverage import GradientSite, gradient_site
 from gbas_ground.monitors.ionosphere_gradient import IonosphereGradientParams
 from gbas_ground.monitors.shared_receiver import Planes, planes_of
 from gbas_ground.params import GroundParams
-from gbas_ground.second_band import BAND, SecondBandSettings, second_band_of
 from gbas_vdb.messages.types import FasDataSet, Type2
 from gbas_vdb.transmission.frame import ScheduleParams
 from gbas_vdb.transmission.schedule import further_sources_that_fit, sources_that_fit

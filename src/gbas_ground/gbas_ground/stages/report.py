@@ -9,9 +9,9 @@ import numpy as np
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import SAT_IDS
 from gbas_ground.broadcast import empty_integrity, fitting
+from gbas_ground.corrections.second_band import SUFFIX
 from gbas_ground.monitors.monitor_table import monitor_detail_epoch, monitor_epoch
 from gbas_ground.prepared import PreparedStation
-from gbas_ground.second_band import SUFFIX
 from gbas_ground.stages.channel_table import channel_epoch
 from gbas_ground.stages.correct import Corrected
 from gbas_ground.stages.decide import Decided

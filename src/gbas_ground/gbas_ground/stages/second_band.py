@@ -34,9 +34,11 @@ from gbas_ground.consistency import (
     Corrections,
     Exclusions,
     Finding,
+    SeenToPass,
     no_exclusions,
     resolve_consistency,
 )
+from gbas_ground.corrections.second_band import BAND, SIGNAL, SUFFIX, SecondBandSettings
 from gbas_ground.corrections.sigma import MAX_SIGMA_M
 from gbas_ground.exclusions import Latch
 from gbas_ground.long_term import initial_long_term, monitor_sigmas
@@ -45,7 +47,6 @@ from gbas_ground.monitors.monitor_table import Summaries, summarise
 from gbas_ground.monitors.sigma_monitor import SigmaMonitorState
 from gbas_ground.monitors.signal_power import check_signal_power
 from gbas_ground.prepared import PreparedStation
-from gbas_ground.second_band import BAND, SIGNAL, SUFFIX, SecondBandSettings
 from gbas_ground.stages.correct import PreviousEpoch, advanced, previous_corrections
 from gbas_ground.stages.decide import Decided
 from gbas_ground.stages.exclusion import exclude_channels, exclude_satellites, released
@@ -143,8 +144,11 @@ def second_band(
     told = {finding.subject for finding in (*of_signals, *of_corrections, *of_sigmas)}
     _tell_changes(state.usable, usable, decided.status.usable, exclusions.satellites, told, now.events)
     exclusions = advanced(
-        exclusions, inputs, corrections, agreement, channel_ok, signals.receivers_quiet,
-        lambda: below(inputs.judged, verdicts, params.monitors.readmission_share), station,
+        exclusions, inputs, corrections, agreement,
+        lambda: SeenToPass(
+            channel_ok, signals.receivers_quiet, below(inputs.judged, verdicts, params.monitors.readmission_share)
+        ),
+        station,
     )  # fmt: skip
     after = SecondBandState(
         exclusions=exclusions,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from gbas_core.models.sigma_curves import CurveSignal, SigmaCurve, ground_parts_m, sigma_curves
+from gbas_core.models.sigma_curves import CurveSignal, SigmaCurve, Wanted, ground_parts_m, sigma_curves
 from gbas_core.parameters import ParameterError
 from gbas_core.record import FloatArray, IntArray
 from gbas_core.satellites import SYSTEM_MASKS
@@ -78,7 +78,7 @@ def second_band_of(params: GroundParams) -> SecondBandSettings | None:
     curves = []
     for smoothing_s in _CURVE_CONSTANTS_S:
         by_system = {
-            system: table.pieces("ground", "all", _CURVE_SIGNAL, designator, smoothing_s, system)
+            system: table.pieces(Wanted("ground", "all", _CURVE_SIGNAL, designator, smoothing_s, system))
             for system in params.station.systems
         }
         for system, pieces in by_system.items():
