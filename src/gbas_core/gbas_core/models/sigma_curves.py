@@ -119,23 +119,6 @@ class SigmaCurves:
         return tuple(sorted((row for row in rows if row.smoothing_s == longest), key=lambda row: row.above_deg))
 
 
-def ground_parts_m(
-    pieces: tuple[SigmaCurve, ...], elevation_rad: FloatArray, mask_rad: float
-) -> tuple[FloatArray, FloatArray]:
-    """What one receiver has of its own, and what all share, by the pieces of a ground curve [m].
-
-    The error of M receivers is ``sqrt(own^2 / M + shared^2)``.
-    """
-    theta_deg = np.rad2deg(elevation_rad)
-    own, shared = np.full(theta_deg.shape, np.nan), np.full(theta_deg.shape, np.nan)
-    for piece in pieces:
-        single = AirborneCurve(a0_m=piece.a0_m, a1_m=piece.a1_m, theta0_deg=piece.theta0_deg)
-        here = (theta_deg > piece.above_deg + EDGE_DEG) | (piece is pieces[0])
-        own = np.where(here, piece.scale * airborne_curve_m(single, elevation_rad, mask_rad=mask_rad), own)
-        shared = np.where(here, piece.scale * piece.a2_m, shared)
-    return own, shared
-
-
 @lru_cache(maxsize=16)
 def sigma_curves(path: str | Path = "") -> SigmaCurves:
     """The table of a file; that of the suite without one.

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from gbas_core.models.sigma_curves import CurveSignal, SigmaCurve, Wanted, ground_parts_m, sigma_curves
+from gbas_core.models.error_models import EDGE_DEG
+from gbas_core.models.sigma_curves import CurveSignal, SigmaCurve, Wanted, sigma_curves
 from gbas_core.parameters import ParameterError
 from gbas_core.record import FloatArray, IntArray
-from gbas_core.satellites import SYSTEM_MASKS
+from gbas_core.satellites import N_SATS, SYSTEM_MASKS
 from gbas_core.signals import L5
 from gbas_msgs_py.codes import Signal
 from gbas_msgs_py.products import L5_30, L5_100, PRODUCT_INDEX
@@ -27,8 +29,6 @@ OF_CONSTANTS: Final = (L5_100, L5_30)
 _CURVE_SIGNAL: Final[CurveSignal] = "L5"
 _CURVE_CONSTANTS_S: Final = (100.0, 30.0)
 
-Pieces = tuple[SigmaCurve, ...]
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SecondBandSettings:
@@ -40,26 +40,31 @@ class SecondBandSettings:
         Places of the products that are broadcast on the axis of :data:`~gbas_msgs_py.products.PRODUCTS`.
     constants : (T,) int array
         Places of their smoothing constants.
-    curves : tuple
-        Pieces of the ground curves of each smoothing constant, by system letter.
+    steps_deg : (P, 2, N) array
+        Elevations above which the pieces of the ground curves of each smoothing constant are used.
+    curves : (4, P, 2, N) array
+        Their a0, a1, theta0 and a2, scaled.
     min_cn0_dbhz : float
     """
 
     products: IntArray
     constants: IntArray
-    curves: tuple[dict[str, Pieces], ...]
+    steps_deg: FloatArray
+    curves: FloatArray
     min_cn0_dbhz: float
 
-    def sigma_parts_m(self, elevation_rad: FloatArray, mask_rad: float) -> FloatArray:
-        """Own and shared part of one receiver's sigma for each smoothing constant, ``(4, N)`` [m]."""
-        parts = []
-        for by_system in self.curves:
-            own = np.full((2, len(elevation_rad)), np.nan)
-            for system, pieces in by_system.items():
-                here = SYSTEM_MASKS[system]
-                own[:, here] = ground_parts_m(pieces, elevation_rad[here], mask_rad)
-            parts.append(own)
-        return np.concatenate(parts)
+    def sigma_parts_m(self, elevation_rad: FloatArray) -> FloatArray:
+        """Own and shared part of one receiver's sigma for each smoothing constant, ``(4, N)`` [m].
+
+        The error of M receivers is ``sqrt(own^2 / M + shared^2)``.
+        """
+        theta_deg = np.rad2deg(elevation_rad)
+        parts = np.full((2, 2, len(theta_deg)), np.nan)
+        for step_deg, a0_m, a1_m, theta0_deg, a2_m in zip(self.steps_deg, *self.curves, strict=True):
+            above = theta_deg > step_deg
+            parts[:, 0] = np.where(above, a0_m + a1_m * np.exp(-theta_deg / theta0_deg), parts[:, 0])
+            parts[:, 1] = np.where(above, a2_m, parts[:, 1])
+        return parts.reshape(4, -1)
 
 
 def second_band_of(params: GroundParams) -> SecondBandSettings | None:
@@ -75,22 +80,38 @@ def second_band_of(params: GroundParams) -> SecondBandSettings | None:
         return None
     places = sorted(PRODUCT_INDEX[name] for name in section.products)
     table, designator = sigma_curves(params.accuracy.curves), params.accuracy.designator
-    curves = []
-    for smoothing_s in _CURVE_CONSTANTS_S:
-        by_system = {
-            system: table.pieces(Wanted("ground", "all", _CURVE_SIGNAL, designator, smoothing_s, system))
-            for system in params.station.systems
-        }
-        for system, pieces in by_system.items():
+    chosen: dict[tuple[int, str], tuple[SigmaCurve, ...]] = {}
+    for constant, smoothing_s in enumerate(_CURVE_CONSTANTS_S):
+        for system in params.station.systems:
+            pieces = table.pieces(Wanted("ground", "all", _CURVE_SIGNAL, designator, smoothing_s, system))
             if not pieces or pieces[0].above_deg > np.rad2deg(params.monitors.elevation_mask_rad):
                 raise ParameterError(
                     f"accuracy.curves = {params.accuracy.curves!r} has no ground curve of {_CURVE_SIGNAL} for "
                     f"accuracy.designator = {designator!r}, system {system}, {smoothing_s:g} s"
                 )
-        curves.append(by_system)
+            chosen[constant, system] = pieces
+    steps_deg, curves = _coefficients(chosen)
     return SecondBandSettings(
         products=np.array(places, dtype=np.int64),
         constants=np.array([OF_CONSTANTS.index(place) for place in places], dtype=np.int64),
-        curves=tuple(curves),
+        steps_deg=steps_deg,
+        curves=curves,
         min_cn0_dbhz=section.min_cn0_dbhz,
     )
+
+
+def _coefficients(chosen: Mapping[tuple[int, str], tuple[SigmaCurve, ...]]) -> tuple[FloatArray, FloatArray]:
+    """Steps ``(P, 2, N)`` and coefficients ``(4, P, 2, N)`` of pieces by smoothing constant and system.
+
+    What a curve has fewer pieces than another never begins.
+    """
+    shape = max(map(len, chosen.values())), len(_CURVE_CONSTANTS_S), N_SATS
+    steps_deg, curves = np.full(shape, np.inf), np.full((4, *shape), np.nan)
+    for (constant, system), pieces in chosen.items():
+        here = SYSTEM_MASKS[system]
+        for number, piece in enumerate(pieces):
+            steps_deg[number, constant, here] = piece.above_deg + EDGE_DEG if number else -np.inf
+            curves[:, number, constant, here] = np.array([
+                [piece.scale * piece.a0_m], [piece.scale * piece.a1_m], [piece.theta0_deg], [piece.scale * piece.a2_m]
+            ])  # fmt: skip
+    return steps_deg, curves

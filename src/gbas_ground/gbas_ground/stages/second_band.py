@@ -56,17 +56,16 @@ from gbas_msgs_py.codes import EventKind, ExclusionCause
 from gbas_msgs_py.events import EventLog
 from gbas_msgs_py.monitors import TESTS
 
-_OF_ONE_BAND: Final = tuple(
-    int(cause)
-    for cause in (
-        ExclusionCause.B_VALUE,
-        ExclusionCause.SIGNAL_POWER,
-        ExclusionCause.EXPECTED_POWER,
-        ExclusionCause.SIGMA_MEAN,
-        ExclusionCause.SIGMA_SPREAD,
-    )
+_OF_ONE_BAND: Final = (
+    ExclusionCause.B_VALUE,
+    ExclusionCause.SIGNAL_POWER,
+    ExclusionCause.EXPECTED_POWER,
+    ExclusionCause.SIGMA_MEAN,
+    ExclusionCause.SIGMA_SPREAD,
 )
 """Causes for which a channel of L1 is excluded and that say nothing of its other band."""
+_FREE: Final[BoolArray] = np.isin(np.arange(1 + max(ExclusionCause)), (ExclusionCause.NONE, *_OF_ONE_BAND))
+"""By a channel's cause on L1, whether its other band may be used."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -198,7 +197,6 @@ def _inputs(
         predicted.clock_s, predicted.elevation_rad, params.monitors.elevation_mask_rad, params.smoothing.settle_time_s,
     )  # fmt: skip
     of_l1 = decided.corrected.exclusions
-    free = ~of_l1.channels.excluded | np.isin(of_l1.channels.cause, _OF_ONE_BAND)
     judged = decided.status.usable
     for each in monitored.signals.second:
         judged = judged if each.ready is None else judged & each.ready
@@ -209,10 +207,10 @@ def _inputs(
             recent, received.known.current, received.changed, correction_m.shape, station.site
         ),
         dt_s=dt_s,
-        settled=settled & free & ~of_l1.receivers.excluded[:, np.newaxis],
+        settled=settled & _FREE[of_l1.channels.cause] & ~of_l1.receivers.excluded[:, np.newaxis],
         judged=judged,
         elevation_rad=predicted.elevation_rad,
-        sigma_m=settings.sigma_parts_m(predicted.elevation_rad, float(params.monitors.elevation_mask_rad)),
+        sigma_m=settings.sigma_parts_m(predicted.elevation_rad),
     )
 
 
