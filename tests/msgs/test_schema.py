@@ -20,6 +20,7 @@ from gbas_core.satellites import N_SATS, RANGING_SOURCE_ID
 from gbas_msgs_py import tables
 from gbas_msgs_py.cdr import TableCodec
 from gbas_msgs_py.codes import Signal
+from gbas_msgs_py.modes import MODES
 from gbas_msgs_py.monitors import TESTS
 from gbas_msgs_py.products import L5_100, PRODUCTS
 from gbas_msgs_py.schema import SchemaError, TableSchema
@@ -35,6 +36,8 @@ VALUES = st.floats(allow_infinity=False, allow_nan=True)
 def random_record(schema: TableSchema[Any], seed: int, satellites: list[int], odd: float = 1.5) -> Any:
     """A record with values, holes, and `odd` somewhere, for the satellites at these places of the axis."""
     rng = np.random.default_rng(seed)
+    if schema is tables.MODES:
+        satellites = satellites[: len(MODES)]  # there are no more rows than modes
     values: dict[str, Any] = {"gps_week": int(rng.integers(0, 65536)), "tow_s": float(rng.uniform(0, 604800))}
     rows = random_keys(schema, rng, len(satellites))
     for item, spec in columns_of(schema.record_type):
@@ -56,9 +59,11 @@ def random_record(schema: TableSchema[Any], seed: int, satellites: list[int], od
 
 
 def random_keys(schema: TableSchema[Any], rng: np.random.Generator, count: int) -> dict[str, np.ndarray]:
-    """Columns that say what a row of the monitors table is about: no two rows the same."""
+    """Columns that say what a row of a table is about: no two rows the same."""
     if not schema.has_rows:
         return {}
+    if schema is tables.MODES:
+        return {"mode": rng.permutation([float(mode.number) for mode in MODES])[:count]}
     every = [(*test, sat, signal) for test in TESTS for sat in RANGING_SOURCE_ID for signal in Signal]
     chosen = np.array(every, dtype=np.float64)[rng.permutation(len(every))[:count]].reshape(count, 4)
     return dict(zip(("monitor", "test", "sat", "signal"), chosen.T, strict=True))

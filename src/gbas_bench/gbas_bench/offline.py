@@ -160,9 +160,8 @@ def _step_through(flight: Flight, clock: _Clock) -> None:
         heard = AirborneEpoch(
             gps_week=week, tow_s=tow_s, observations=epoch.user, bursts=bursts, ephemerides=ephemerides
         )
-        position, (solution, *_), _ = clock.time(
-            "position", AirborneReceiver.position, position, heard, flight.airborne
-        )
+        position, selected = clock.time("position", AirborneReceiver.position, position, heard, flight.airborne)
+        solution = selected.solutions[0]
         service, protection, _ = clock.time("protect", AirborneReceiver.protect, service, solution, flight.airborne)
         clock.time("vdb decode", lambda bursts=bursts: [decode_burst(burst) for burst in bursts])
         _convert(clock, epoch, monitored, solution, protection)

@@ -72,9 +72,9 @@ def aircraft(flight: Flight, sent: list[tuple[Burst, ...]]) -> int:
             gps_week=week, tow_s=tow_s, observations=epoch.user, bursts=bursts,
             ephemerides=() if number else (flight.ephemeris,),
         )  # fmt: skip
-        position, (solution, *_), _ = AirborneReceiver.position(position, heard, flight.airborne)
-        service, protection, _ = AirborneReceiver.protect(service, solution, flight.airborne)
-        _there_and_back(tables.SOLUTION, solution)
+        position, selected = AirborneReceiver.position(position, heard, flight.airborne)
+        service, protection, _ = AirborneReceiver.protect(service, selected.solutions[0], flight.airborne)
+        _there_and_back(tables.SOLUTION, selected.solutions[0])
         _there_and_back(tables.PROTECTION, protection)
         protected += protection.vpl_m < float("inf")
     return protected

@@ -12,6 +12,7 @@ from gbas_ground.claims.limits import MAX_M_EIG, MAX_Y_EIG_M
 from gbas_ground.claims.orbit_claim import refuse_smaller as refuse_smaller_decorrelation
 from gbas_ground.corrections.second_band import second_band_of
 from gbas_ground.monitors.false_alarm import FALSE_EXCLUSION
+from gbas_ground.sections import GCID_UNHEALTHY
 from gbas_vdb.errors import VdbError
 from gbas_vdb.transmission.schedule import further_sources_that_fit, sources_that_fit
 
@@ -143,6 +144,8 @@ def _check_gradient_claim(params: GroundParams) -> None:
     gast_d = params.gast_d
     if params.station.gcid in TYPE_D_GCID and not gast_d.enabled:
         raise ParameterError(f"station.gcid = {params.station.gcid} claims service type D, and gast_d.enabled is false")
+    if gast_d.enabled and not gast_d.required and params.station.gcid != GCID_UNHEALTHY:
+        raise ParameterError(f"gast_d.required = false with station.gcid = {params.station.gcid}, expected 7")
     if not gast_d.enabled or (gast_d.y_eig_m >= MAX_Y_EIG_M and gast_d.m_eig >= MAX_M_EIG):
         return
     try:

@@ -167,10 +167,10 @@ class PreparedStation:
     @property
     def gradient_required(self) -> bool:
         """Whether satellites must be monitored for gradients."""
-        return self.params.ionosphere_gradient.required or self.params.gast_d.enabled
+        return self.params.ionosphere_gradient.required or self.params.gast_d.demands_monitors
 
     @property
     def orbit_required(self) -> bool:
         """Whether orbits must be bounded by the station's own monitor."""
-        required = self.params.ephemeris_residual.required or self.params.gast_d.enabled
+        required = self.params.ephemeris_residual.required or self.params.gast_d.demands_monitors
         return required and not self.params.ephemeris.external_monitor

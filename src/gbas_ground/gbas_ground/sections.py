@@ -177,8 +177,20 @@ class GastDSection:
     """Service type D."""
 
     enabled: Annotated[bool, Parameter("broadcast type 11 messages and additional data block 3")] = False
+    required: Annotated[
+        bool,
+        Parameter(
+            "satellites that the gradient and the orbit monitor cannot judge are not used; false, for recorded data, "
+            "only where the station says that it is not healthy"
+        ),
+    ] = True
     y_eig_m: Annotated[float, Parameter("ionospheric error at the station", "m", 0.0, MAX_Y_EIG_M)] = MAX_Y_EIG_M
     m_eig: Annotated[float, Parameter("its growth with distance", "m/m", 0.0, MAX_M_EIG)] = MAX_M_EIG
+
+    @property
+    def demands_monitors(self) -> bool:
+        """Whether satellites without these monitors' judgement are not used."""
+        return self.enabled and self.required
 
 
 @parameters

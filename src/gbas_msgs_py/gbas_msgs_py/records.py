@@ -13,7 +13,8 @@ import numpy as np
 
 from gbas_core.record import FloatArray, Record, columns_of, per_row, per_satellite, scalar
 from gbas_core.satellites import N_SATS, RANGING_SOURCE_ID, SAT_IDS, SAT_INDEX, SOURCE_ID_INDEX
-from gbas_msgs_py.codes import MonitorState, Signal
+from gbas_msgs_py.codes import MonitorState, ServiceCause, ServiceType, Signal
+from gbas_msgs_py.modes import MODES
 from gbas_msgs_py.monitors import MONITORS, TESTS, monitor_named
 from gbas_msgs_py.products import PRODUCTS
 
@@ -266,3 +267,27 @@ class ProtectionEpoch(Record):
     val_m: float = scalar("m", "vertical alert limit, NaN without a FAS")
     lal_m: float = scalar("m", "lateral alert limit, NaN without a FAS")
     state: float = scalar("-", "ApproachState")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ModesEpoch(Record):
+    """All processing modes of one airborne epoch beside one another: a row for each mode that runs."""
+
+    mode: FloatArray = per_row("-", "number of the mode", key=True, codes=(mode.number for mode in MODES))
+    guides: FloatArray = per_row("-", "1 for the mode whose solution is that of the aircraft", codes=(0, 1))
+    service: FloatArray = per_row("-", "ServiceType the mode could give, 0 when none", codes=ServiceType)
+    cause: FloatArray = per_row("-", "ServiceCause: why it could not", codes=ServiceCause)
+    value: FloatArray = per_row("*", "what did not hold, in the unit of the cause; NaN where it has none")
+    threshold: FloatArray = per_row("*", "its bound")
+    x_m: FloatArray = per_row("m", "ECEF position")
+    y_m: FloatArray = per_row("m", "ECEF position")
+    z_m: FloatArray = per_row("m", "ECEF position")
+    n_sats: FloatArray = per_row("-", "satellites used")
+    vpl_m: FloatArray = per_row("m", "vertical protection level")
+    lpl_m: FloatArray = per_row("m", "lateral protection level")
+    veb_m: FloatArray = per_row("m", "vertical ephemeris error bound, NaN where not provided")
+    leb_m: FloatArray = per_row("m", "lateral ephemeris error bound, NaN where not provided")
+    val_m: FloatArray = per_row("m", "vertical alert limit, NaN without a FAS")
+    lal_m: FloatArray = per_row("m", "lateral alert limit, NaN without a FAS")
+    d_vert_m: FloatArray = per_row("m", "|30 s less 100 s| vertical position, 0 for modes without")
+    d_lat_m: FloatArray = per_row("m", "|30 s less 100 s| lateral position, 0 for modes without")

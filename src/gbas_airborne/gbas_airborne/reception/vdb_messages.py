@@ -16,6 +16,7 @@ from typing import Final
 from gbas_airborne.modes import PRODUCT_OF_MEASUREMENT
 from gbas_airborne.params import NO_FAS, AirborneParams
 from gbas_airborne.reception.second_frequency import PRODUCT_OF_PRIVATE, whole_set
+from gbas_airborne.reception.service_d import joined, with_decorrelation
 from gbas_airborne.reception.station_data import (
     EphemerisChecks,
     correction_set,
@@ -77,6 +78,7 @@ def reception_step(
     intake.count(failed=malformed)
     for burst in ready:
         intake.take(burst)
+        intake.join_type11()
     intake.expire()
     return intake.finished(), intake.events.all()
 
@@ -248,6 +250,11 @@ class _VdbMessageProcessor:
         kept = tuple(m for m in kept if m.modified_z_count_s == message.modified_z_count_s)
         self.state.type11 = (*kept, message)
         self.state.type11_frame = frame
+        self.state.p_d = with_decorrelation(self.state.p_d, message)
+
+    def join_type11(self) -> None:
+        """Corrections of GAST-D, where messages of both types of one instant are there."""
+        self.state.corrections = joined(self.state.corrections, self.state.type11, self.state.type11_frame)
 
     def _take_type8(self, message: Type8, burst: Burst) -> None:
         """Corrections of a second frequency: a message, or a linked pair in one frame."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from gbas_airborne.reception.second_frequency import Half
 from gbas_airborne.reception.station_data import Corrections, EphemerisChecks, StationData
 from gbas_core.positioning.approach import FinalApproach
+from gbas_core.record import FloatArray
 from gbas_vdb.messages.types import Type1, Type2, Type11
 from gbas_vdb.transmission.burst import Burst
 
@@ -49,6 +50,8 @@ class ReceptionState:
         First halves of linked pairs of private messages, by their measurement type.
     type11, type11_frame
         The 30 s corrections of one frame, and which.
+    p_d : (N_SATS,) array or None
+        P_D as type 11 messages sent it [m/m].
     """
 
     station_id: str | None = None
@@ -65,5 +68,6 @@ class ReceptionState:
     pending_private: Mapping[int, Half] = field(default_factory=dict)
     type11: tuple[Type11, ...] = ()
     type11_frame: tuple[int, float] | None = None
+    p_d: FloatArray | None = None
     waiting: tuple[Burst, ...] = ()
     counts: Counts = field(default_factory=Counts)
