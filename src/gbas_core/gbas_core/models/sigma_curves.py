@@ -102,7 +102,9 @@ class SigmaCurves:
                         raise ParameterError(f"curves: two of {', '.join(map(str, key))}")
                     keys.add(key)
 
-    def pieces(self, wanted: Wanted) -> tuple[SigmaCurve, ...]:
+    def pieces(
+        self, end: End, part: Part, signal: CurveSignal, designator: str, smoothing_s: float, system: str
+    ) -> tuple[SigmaCurve, ...]:
         """The pieces of one curve, the lowest first; none when the table has none.
 
         A time constant that has no rows takes those of the longest one below it, whose errors are larger.
@@ -110,10 +112,10 @@ class SigmaCurves:
         rows = [
             row
             for row in self.curves
-            if (row.end, row.part, row.signal) == wanted[:3]
-            and wanted.designator in row.designators
-            and wanted.system in row.systems
-            and row.smoothing_s <= wanted.smoothing_s
+            if (row.end, row.part, row.signal) == (end, part, signal)
+            and designator in row.designators
+            and system in row.systems
+            and row.smoothing_s <= smoothing_s
         ]
         longest = max((row.smoothing_s for row in rows), default=0.0)
         return tuple(sorted((row for row in rows if row.smoothing_s == longest), key=lambda row: row.above_deg))
@@ -215,7 +217,7 @@ class Place(NamedTuple):
 
 def _curve_m(table: SigmaCurves, wanted: Wanted, place: Place) -> FloatArray:
     """One part of the error: a curve of the table, or the combination of those of L1 and L5."""
-    pieces = table.pieces(wanted)
+    pieces = table.pieces(*wanted)
     of_constant = bool(pieces) and pieces[0].smoothing_s == wanted.smoothing_s
     if wanted.signal == "L1_L5" and not of_constant:
         return sigma_ionosphere_free_m(

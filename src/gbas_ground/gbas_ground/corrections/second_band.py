@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from gbas_core.models.error_models import EDGE_DEG
-from gbas_core.models.sigma_curves import CurveSignal, SigmaCurve, Wanted, sigma_curves
+from gbas_core.models.sigma_curves import CurveSignal, SigmaCurve, sigma_curves
 from gbas_core.parameters import ParameterError
 from gbas_core.record import FloatArray, IntArray
 from gbas_core.satellites import N_SATS, SYSTEM_MASKS
@@ -83,7 +83,7 @@ def second_band_of(params: GroundParams) -> SecondBandSettings | None:
     chosen: dict[tuple[int, str], tuple[SigmaCurve, ...]] = {}
     for constant, smoothing_s in enumerate(_CURVE_CONSTANTS_S):
         for system in params.station.systems:
-            pieces = table.pieces(Wanted("ground", "all", _CURVE_SIGNAL, designator, smoothing_s, system))
+            pieces = table.pieces("ground", "all", _CURVE_SIGNAL, designator, smoothing_s, system)
             if not pieces or pieces[0].above_deg > np.rad2deg(params.monitors.elevation_mask_rad):
                 raise ParameterError(
                     f"accuracy.curves = {params.accuracy.curves!r} has no ground curve of {_CURVE_SIGNAL} for "
