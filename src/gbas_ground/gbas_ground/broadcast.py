@@ -166,7 +166,7 @@ def fitting(integrity: IntegrityEpoch, station: PreparedStation) -> Fitting:
     sent = np.zeros_like(usable)
     sent[list(satellites)] = True
     of_second = second_broadcastable(integrity, sent, station)
-    room = settings.second_room(len(satellites))
+    room = settings.second_rooms[len(satellites)]
     second = _highest(of_second, integrity.elevation_rad, max(room, 0))
     return Fitting(satellites, second, settings.room, room, left_out, int(np.count_nonzero(of_second)) - len(second))
 

@@ -247,14 +247,30 @@ class ReadmissionState:
     satellites: BoolArray
 
 
+class SeenToPass(NamedTuple):
+    """What the monitors before this stage say, by which an exclusion may end.
+
+    Attributes
+    ----------
+    channels : (R, N) bool array
+        Channels that are tracked and pass the monitors of single channels.
+    receivers_quiet : (R,) array
+        1 where a receiver would do on its baselines, 0 where not, NaN where nobody can tell.
+    satellites : (N,) bool array
+        Satellites that the monitors of signals were seen to pass.
+    """
+
+    channels: BoolArray
+    receivers_quiet: FloatArray
+    satellites: BoolArray
+
+
 def readmission_state(
     correction_inputs: CorrectionInputs,
     corrections: Corrections,
     checks: Checks,
     exclusions: Exclusions,
-    channel_ok: BoolArray,
-    receivers_quiet: FloatArray,
-    satellite_ok: BoolArray,
+    seen: SeenToPass,
     station: PreparedStation,
 ) -> ReadmissionState:
     """Judge what is not used against the corrections it has no part in.
@@ -263,12 +279,7 @@ def readmission_state(
     ----------
     correction_inputs, corrections, checks, exclusions
         As they are after :func:`resolve_consistency`.
-    channel_ok : (R, N) bool array
-        Channels that are tracked and pass the monitors of single channels.
-    receivers_quiet : (R,) array
-        1 where a receiver would do on its baselines, 0 where not, NaN where nobody can tell.
-    satellite_ok : (N,) bool array
-        Satellites that the monitors of signals were seen to pass.
+    seen : SeenToPass
     station : PreparedStation
 
     Notes
@@ -285,6 +296,7 @@ def readmission_state(
     would ever end. Then everything is judged together as if nothing were excluded, and passes together or not at all.
     """
     settings = station.consistency
+    channel_ok, receivers_quiet, satellite_ok = seen
     residual_m = kernels.residual_m(
         correction_inputs.correction_m, correction_inputs.settled, corrections.common, corrections.prc_m, settings
     )

@@ -10,8 +10,8 @@ from gbas_core.parameters import ParameterError
 from gbas_ground.claims.gradient_claim import refuse_smaller as refuse_smaller_gradient
 from gbas_ground.claims.limits import MAX_M_EIG, MAX_Y_EIG_M
 from gbas_ground.claims.orbit_claim import refuse_smaller as refuse_smaller_decorrelation
+from gbas_ground.corrections.second_band import second_band_of
 from gbas_ground.monitors.false_alarm import FALSE_EXCLUSION
-from gbas_ground.second_band import second_band_of
 from gbas_ground.sections import GCID_UNHEALTHY
 from gbas_vdb.errors import VdbError
 from gbas_vdb.transmission.schedule import further_sources_that_fit, sources_that_fit

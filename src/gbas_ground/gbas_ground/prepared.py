@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +16,7 @@ from gbas_ground.channels.tracking import SMOOTHED_BANDS, filter_params
 from gbas_ground.claims.limits import MAX_DECORRELATION
 from gbas_ground.claims.orbit_claim import OrbitSite, orbit_bound
 from gbas_ground.corrections.kernels.consistency import Settings
+from gbas_ground.corrections.second_band import BAND, SecondBandSettings, second_band_of
 from gbas_ground.corrections.sigma import settings_of
 from gbas_ground.ionosphere.places import Places, places_of
 from gbas_ground.monitors.carrier_acceleration import CarrierAccelerationParams
@@ -28,7 +29,6 @@ from gbas_ground.monitors.gradient_coverage import GradientSite, gradient_site
 from gbas_ground.monitors.ionosphere_gradient import IonosphereGradientParams
 from gbas_ground.monitors.shared_receiver import Planes, planes_of
 from gbas_ground.params import GroundParams
-from gbas_ground.second_band import BAND, SecondBandSettings, second_band_of
 from gbas_vdb.messages.types import FasDataSet, Type2
 from gbas_vdb.transmission.frame import ScheduleParams
 from gbas_vdb.transmission.schedule import further_sources_that_fit, sources_that_fit
@@ -37,29 +37,15 @@ from gbas_vdb.transmission.schedule import further_sources_that_fit, sources_tha
 class FrameSettings(NamedTuple):
     """What every frame is made with: station data, approaches, schedule, and how many satellites fit.
 
-    `kinds` are the measurement types of the messages with corrections of a second band.
+    `second_rooms` says how many fit with a second band too, by how many are sent; -1 where not even a message without
+    any does. It is empty where there is no second band.
     """
 
     station: Type2
     approaches: tuple[FasDataSet, ...]
     schedule: ScheduleParams
     room: int
-    kinds: tuple[int, ...]
-
-    def second_room(self, n_satellites: int) -> int:
-        """How many satellites fit with a second band beside so many; -1 where not even a message without any does."""
-        return _second_room(n_satellites, self.kinds, self.station, self.approaches, self.schedule)
-
-
-@lru_cache(maxsize=256)
-def _second_room(
-    n_satellites: int,
-    kinds: tuple[int, ...],
-    station: Type2,
-    approaches: tuple[FasDataSet, ...],
-    schedule: ScheduleParams,
-) -> int:
-    return further_sources_that_fit(n_satellites, kinds, station, approaches, schedule)
+    second_rooms: tuple[int, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +89,9 @@ class PreparedStation:
         """What every frame is made with."""
         params = self.params
         given = params.station_message(), params.approach_messages(), params.schedule()
-        return FrameSettings(*given, room=sources_that_fit(*given), kinds=params.private_kinds())
+        room, kinds = sources_that_fit(*given), params.private_kinds()
+        second_rooms = [further_sources_that_fit(number, kinds, *given) for number in range(room + 1) if kinds]
+        return FrameSettings(*given, room=room, second_rooms=tuple(second_rooms))
 
     @cached_property
     def places(self) -> Places | None:

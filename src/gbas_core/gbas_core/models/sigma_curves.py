@@ -12,7 +12,7 @@ from __future__ import annotations
 from functools import lru_cache
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Final, Literal
+from typing import Annotated, Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -65,13 +65,24 @@ class SigmaCurve:
         if not self.source:
             raise ParameterError("source is empty")
 
-    def error_m(self, elevation_rad: ArrayLike, n_receivers: ArrayLike, mask_rad: float) -> FloatArray:
+    def error_m(self, elevation_rad: ArrayLike, n_receivers: ArrayLike, *, mask_rad: float = MASK_RAD) -> FloatArray:
         """The curve [m]; NaN below the mask, and of the ground for fewer than one receiver."""
         if self.end == "air":
             single = AirborneCurve(a0_m=self.a0_m, a1_m=self.a1_m, theta0_deg=self.theta0_deg)
             return self.scale * airborne_curve_m(single, elevation_rad, mask_rad=mask_rad)
         shared = GroundCurve(a0_m=self.a0_m, a1_m=self.a1_m, theta0_deg=self.theta0_deg, a2_m=self.a2_m)
         return self.scale * ground_curve_m(shared, elevation_rad, n_receivers, mask_rad=mask_rad)
+
+
+class Wanted(NamedTuple):
+    """Which curve."""
+
+    end: End
+    part: Part
+    signal: CurveSignal
+    designator: str
+    smoothing_s: float
+    system: str
 
 
 @parameters
@@ -110,23 +121,6 @@ class SigmaCurves:
         return tuple(sorted((row for row in rows if row.smoothing_s == longest), key=lambda row: row.above_deg))
 
 
-def ground_parts_m(
-    pieces: tuple[SigmaCurve, ...], elevation_rad: FloatArray, mask_rad: float
-) -> tuple[FloatArray, FloatArray]:
-    """What one receiver has of its own, and what all share, by the pieces of a ground curve [m].
-
-    The error of M receivers is ``sqrt(own^2 / M + shared^2)``.
-    """
-    theta_deg = np.rad2deg(elevation_rad)
-    own, shared = np.full(theta_deg.shape, np.nan), np.full(theta_deg.shape, np.nan)
-    for piece in pieces:
-        single = AirborneCurve(a0_m=piece.a0_m, a1_m=piece.a1_m, theta0_deg=piece.theta0_deg)
-        here = (theta_deg > piece.above_deg + EDGE_DEG) | (piece is pieces[0])
-        own = np.where(here, piece.scale * airborne_curve_m(single, elevation_rad, mask_rad=mask_rad), own)
-        shared = np.where(here, piece.scale * piece.a2_m, shared)
-    return own, shared
-
-
 @lru_cache(maxsize=16)
 def sigma_curves(path: str | Path = "") -> SigmaCurves:
     """The table of a file; that of the suite without one.
@@ -150,7 +144,6 @@ def sigma_air_m(
     *,
     system: str = "G",
     table: SigmaCurves | None = None,
-    mask_rad: float = MASK_RAD,
 ) -> FloatArray:
     """Airborne receiver noise and multipath of a smoothed range.
 
@@ -171,7 +164,7 @@ def sigma_air_m(
     Returns
     -------
     array
-        Standard deviation [m]; NaN below the mask.
+        Standard deviation [m]; NaN below 5 degrees.
 
     Raises
     ------
@@ -183,12 +176,10 @@ def sigma_air_m(
     """
     if designator not in ("A", "B"):
         raise ValueError(f"airborne accuracy designator {designator!r} is not A or B")
-    curves = table or sigma_curves()
-    parts = [
-        _curve_m(curves, "air", part, signal, designator, smoothing_s, system, elevation_rad, 1.0, mask_rad)
-        for part in _AIR_PARTS
-    ]
-    return np.hypot(*parts)
+    curves, place = table or sigma_curves(), Place(elevation_rad)
+    return np.hypot(*(
+        _curve_m(curves, Wanted("air", part, signal, designator, smoothing_s, system), place) for part in _AIR_PARTS
+    ))  # fmt: skip
 
 
 def sigma_gnd_m(
@@ -199,49 +190,46 @@ def sigma_gnd_m(
     n_receivers: ArrayLike,
     *,
     system: str = "G",
-    table: SigmaCurves | None = None,
-    mask_rad: float = MASK_RAD,
 ) -> FloatArray:
-    """Error of a correction that the mean of `n_receivers` reference receivers gives.
+    """Error of a correction that the mean of `n_receivers` reference receivers gives, by the suite's table.
 
     Parameters, exceptions as :func:`sigma_air_m`; the designators are A, B and C.
 
     Returns
     -------
     array
-        Standard deviation [m]; NaN below the mask and for fewer than one receiver.
+        Standard deviation [m]; NaN below 5 degrees and for fewer than one receiver.
 
     Source: for L1 and 100 s or more equal to :func:`~gbas_core.models.error_models.sigma_pr_gnd`.
     """
     if designator not in ("A", "B", "C"):
         raise ValueError(f"ground accuracy designator {designator!r} is not A, B or C")
-    curves = table or sigma_curves()
-    return _curve_m(
-        curves, "ground", "all", signal, designator, smoothing_s, system, elevation_rad, n_receivers, mask_rad
-    )
+    wanted = Wanted("ground", "all", signal, designator, smoothing_s, system)
+    return _curve_m(sigma_curves(), wanted, Place(elevation_rad, n_receivers))
 
 
-def _curve_m(
-    table: SigmaCurves, end: End, part: Part, signal: CurveSignal, designator: str, smoothing_s: float, system: str,
-    elevation_rad: ArrayLike, n_receivers: ArrayLike, mask_rad: float,
-) -> FloatArray:  # fmt: skip
+class Place(NamedTuple):
+    """Where an error is wanted: elevation [rad], and receivers in the mean."""
+
+    elevation_rad: ArrayLike
+    n_receivers: ArrayLike = 1.0
+
+
+def _curve_m(table: SigmaCurves, wanted: Wanted, place: Place) -> FloatArray:
     """One part of the error: a curve of the table, or the combination of those of L1 and L5."""
-    pieces = table.pieces(end, part, signal, designator, smoothing_s, system)
-    of_constant = bool(pieces) and pieces[0].smoothing_s == smoothing_s
-    if signal == "L1_L5" and not of_constant:
-        first, second = (
-            _curve_m(table, end, part, each, designator, smoothing_s, system, elevation_rad, n_receivers, mask_rad)
-            for each in ("L1", "L5")
+    pieces = table.pieces(*wanted)
+    of_constant = bool(pieces) and pieces[0].smoothing_s == wanted.smoothing_s
+    if wanted.signal == "L1_L5" and not of_constant:
+        return sigma_ionosphere_free_m(
+            _curve_m(table, wanted._replace(signal="L1"), place), _curve_m(table, wanted._replace(signal="L5"), place)
         )
-        return sigma_ionosphere_free_m(first, second)
-    if not pieces or pieces[0].above_deg > np.rad2deg(mask_rad):
+    if not pieces or pieces[0].above_deg > np.rad2deg(MASK_RAD):
         raise ValueError(
-            f"the table has no {end} curve ({part}) of {signal} for designator {designator}, system {system}, "
-            f"{smoothing_s:g} s"
+            f"the table has no {wanted.end} curve ({wanted.part}) of {wanted.signal} for designator "
+            f"{wanted.designator}, system {wanted.system}, {wanted.smoothing_s:g} s"
         )
-    theta_deg = np.rad2deg(np.asarray(elevation_rad, dtype=np.float64))
-    error_m = pieces[0].error_m(elevation_rad, n_receivers, mask_rad)
+    theta_deg = np.rad2deg(np.asarray(place.elevation_rad, dtype=np.float64))
+    error_m = pieces[0].error_m(*place)
     for piece in pieces[1:]:
-        higher_m = piece.error_m(elevation_rad, n_receivers, mask_rad)
-        error_m = np.where(theta_deg > piece.above_deg + EDGE_DEG, higher_m, error_m)
+        error_m = np.where(theta_deg > piece.above_deg + EDGE_DEG, piece.error_m(*place), error_m)
     return error_m

@@ -18,6 +18,7 @@ from gbas_ground.consistency import (
     Corrections,
     Exclusions,
     Finding,
+    SeenToPass,
     readmission_state,
     resolve_consistency,
 )
@@ -27,6 +28,7 @@ from gbas_ground.exclusions import advance
 from gbas_ground.long_term import monitor_sigmas
 from gbas_ground.monitors.monitor_table import Summaries
 from gbas_ground.monitors.sigma_monitor import SigmaMonitorState
+from gbas_ground.params import GroundParams
 from gbas_ground.prepared import PreparedStation
 from gbas_ground.stages.monitor import Monitored
 from gbas_ground.stages.track import Tracked
@@ -99,16 +101,7 @@ def correct(state: CorrectState, monitored: Monitored, station: PreparedStation)
         corrections=corrections,
         summaries={**checks.summaries(), **sigma_summaries},
         findings=(*monitored.findings, *of_corrections, *of_sigmas),
-        exclusions=advanced(
-            exclusions,
-            inputs,
-            corrections,
-            checks,
-            tracked.channel_ok,
-            monitored.signals.receivers_quiet,
-            lambda: monitored.signals.passed(params.monitors.readmission_share),
-            station,
-        ),
+        exclusions=advanced(exclusions, inputs, corrections, checks, _seen(monitored, params), station),
     )
     return CorrectState(previous=_previous(tracked), sigmas=sigmas), corrected
 
@@ -157,25 +150,28 @@ def previous_corrections(
     return np.where(changed, again, previous.correction_m)
 
 
+def _seen(monitored: Monitored, params: GroundParams) -> Callable[[], SeenToPass]:
+    """What the monitors of signals were seen to pass."""
+    signals = monitored.signals
+    return lambda: SeenToPass(
+        monitored.tracked.channel_ok, signals.receivers_quiet, signals.passed(params.monitors.readmission_share)
+    )
+
+
 def advanced(
     exclusions: Exclusions,
     inputs: CorrectionInputs,
     corrections: Corrections,
     checks: Checks,
-    channel_ok: BoolArray,
-    receivers_quiet: FloatArray,
-    satellite_ok: Callable[[], BoolArray],
+    seen: Callable[[], SeenToPass],
     station: PreparedStation,
 ) -> Exclusions:
-    """Count the clear time of everything that is excluded; parameters as of :func:`readmission_state`, one of them
-    only looked at where anything is."""
+    """Count the clear time of everything that is excluded; what was seen is asked for only where anything is."""
     latches = (exclusions.channels, exclusions.receivers, exclusions.satellites)
     if not any(latch.remembers for latch in latches):
         return exclusions
     max_gap_s = station.params.smoothing.max_gap_s
-    passed = readmission_state(
-        inputs, corrections, checks, exclusions, channel_ok, receivers_quiet, satellite_ok(), station
-    )
+    passed = readmission_state(inputs, corrections, checks, exclusions, seen(), station)
     return Exclusions(
         channels=advance(exclusions.channels, passed.channels, inputs.dt_s, max_gap_s),
         receivers=advance(exclusions.receivers, passed.receivers, inputs.dt_s, max_gap_s),

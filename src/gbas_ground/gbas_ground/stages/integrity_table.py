@@ -7,8 +7,8 @@ from typing import Final
 import numpy as np
 
 from gbas_core.record import BoolArray
+from gbas_ground.corrections.second_band import SecondBandSettings
 from gbas_ground.params import GroundParams
-from gbas_ground.second_band import SecondBandSettings
 from gbas_ground.stages.decide import Decided
 from gbas_ground.stages.kernels.integrity import claims_of_usable, corrections_of_usable, rows_of
 from gbas_ground.stages.second_band import SecondBand

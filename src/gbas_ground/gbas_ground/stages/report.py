@@ -9,9 +9,9 @@ import numpy as np
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import SAT_IDS
 from gbas_ground.broadcast import empty_integrity, fitting
+from gbas_ground.corrections.second_band import SUFFIX
 from gbas_ground.monitors.monitor_table import monitor_detail_epoch, monitor_epoch
 from gbas_ground.prepared import PreparedStation
-from gbas_ground.second_band import SUFFIX
 from gbas_ground.stages.channel_table import channel_epoch
 from gbas_ground.stages.correct import Corrected
 from gbas_ground.stages.decide import Decided
@@ -89,7 +89,7 @@ def report(
     serving = bool(status.usable.any())
     _contribution_events(state.contributing, contributing, corrected, now.events)
     _satellite_events(state, decided, serving, now.events)
-    left_out = _room_events(state.left_out, integrity, status, station, now.events)
+    left_out = _room_events(state.left_out, integrity, status, second, station, now.events)
     shown = np.isfinite(integrity.state)
     summaries = {**tracked.summaries, **signals.summaries, **corrected.summaries}
     made = StationReport(
@@ -104,13 +104,17 @@ def report(
 
 
 def _room_events(
-    before: tuple[int, int], integrity: IntegrityEpoch, status: SatelliteStatus, station: PreparedStation,
-    events: EventLog,
+    before: tuple[int, int], integrity: IntegrityEpoch, status: SatelliteStatus, second: SecondBand | None,
+    station: PreparedStation, events: EventLog,
 ) -> tuple[int, int]:  # fmt: skip
     """Say when satellites are left out for want of room, by how many, and when all fit again; value: those there are,
     threshold: those that fit."""
-    if station.second is None and np.count_nonzero(status.usable) <= station.frames.room:
-        left_out, counts, rooms = (0, 0), (0, 0), (station.frames.room, 0)
+    n_usable, frames = int(np.count_nonzero(status.usable)), station.frames
+    n_second = 0 if second is None else int(np.count_nonzero(second.usable))
+    fits = n_usable <= frames.room
+    if fits and n_second <= (frames.second_rooms[n_usable] if n_second else 0):
+        left_out, counts = (0, 0), (n_usable, n_second)
+        rooms = frames.room, frames.second_rooms[n_usable] if frames.second_rooms else 0
     else:
         sent = fitting(integrity, station)
         left_out = sent.left_out, sent.second_left_out

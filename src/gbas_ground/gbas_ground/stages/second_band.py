@@ -34,9 +34,11 @@ from gbas_ground.consistency import (
     Corrections,
     Exclusions,
     Finding,
+    SeenToPass,
     no_exclusions,
     resolve_consistency,
 )
+from gbas_ground.corrections.second_band import BAND, SIGNAL, SUFFIX, SecondBandSettings
 from gbas_ground.corrections.sigma import MAX_SIGMA_M
 from gbas_ground.exclusions import Latch
 from gbas_ground.long_term import initial_long_term, monitor_sigmas
@@ -45,7 +47,6 @@ from gbas_ground.monitors.monitor_table import Summaries, summarise
 from gbas_ground.monitors.sigma_monitor import SigmaMonitorState
 from gbas_ground.monitors.signal_power import check_signal_power
 from gbas_ground.prepared import PreparedStation
-from gbas_ground.second_band import BAND, SIGNAL, SUFFIX, SecondBandSettings
 from gbas_ground.stages.correct import PreviousEpoch, advanced, previous_corrections
 from gbas_ground.stages.decide import Decided
 from gbas_ground.stages.exclusion import exclude_channels, exclude_satellites, released
@@ -55,17 +56,16 @@ from gbas_msgs_py.codes import EventKind, ExclusionCause
 from gbas_msgs_py.events import EventLog
 from gbas_msgs_py.monitors import TESTS
 
-_OF_ONE_BAND: Final = tuple(
-    int(cause)
-    for cause in (
-        ExclusionCause.B_VALUE,
-        ExclusionCause.SIGNAL_POWER,
-        ExclusionCause.EXPECTED_POWER,
-        ExclusionCause.SIGMA_MEAN,
-        ExclusionCause.SIGMA_SPREAD,
-    )
+_OF_ONE_BAND: Final = (
+    ExclusionCause.B_VALUE,
+    ExclusionCause.SIGNAL_POWER,
+    ExclusionCause.EXPECTED_POWER,
+    ExclusionCause.SIGMA_MEAN,
+    ExclusionCause.SIGMA_SPREAD,
 )
 """Causes for which a channel of L1 is excluded and that say nothing of its other band."""
+_FREE: Final[BoolArray] = np.isin(np.arange(1 + max(ExclusionCause)), (ExclusionCause.NONE, *_OF_ONE_BAND))
+"""By a channel's cause on L1, whether its other band may be used."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -143,8 +143,11 @@ def second_band(
     told = {finding.subject for finding in (*of_signals, *of_corrections, *of_sigmas)}
     _tell_changes(state.usable, usable, decided.status.usable, exclusions.satellites, told, now.events)
     exclusions = advanced(
-        exclusions, inputs, corrections, agreement, channel_ok, signals.receivers_quiet,
-        lambda: below(inputs.judged, verdicts, params.monitors.readmission_share), station,
+        exclusions, inputs, corrections, agreement,
+        lambda: SeenToPass(
+            channel_ok, signals.receivers_quiet, below(inputs.judged, verdicts, params.monitors.readmission_share)
+        ),
+        station,
     )  # fmt: skip
     after = SecondBandState(
         exclusions=exclusions,
@@ -194,7 +197,6 @@ def _inputs(
         predicted.clock_s, predicted.elevation_rad, params.monitors.elevation_mask_rad, params.smoothing.settle_time_s,
     )  # fmt: skip
     of_l1 = decided.corrected.exclusions
-    free = ~of_l1.channels.excluded | np.isin(of_l1.channels.cause, _OF_ONE_BAND)
     judged = decided.status.usable
     for each in monitored.signals.second:
         judged = judged if each.ready is None else judged & each.ready
@@ -205,10 +207,10 @@ def _inputs(
             recent, received.known.current, received.changed, correction_m.shape, station.site
         ),
         dt_s=dt_s,
-        settled=settled & free & ~of_l1.receivers.excluded[:, np.newaxis],
+        settled=settled & _FREE[of_l1.channels.cause] & ~of_l1.receivers.excluded[:, np.newaxis],
         judged=judged,
         elevation_rad=predicted.elevation_rad,
-        sigma_m=settings.sigma_parts_m(predicted.elevation_rad, float(params.monitors.elevation_mask_rad)),
+        sigma_m=settings.sigma_parts_m(predicted.elevation_rad),
     )
 
 

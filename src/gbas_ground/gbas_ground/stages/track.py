@@ -16,6 +16,7 @@ from gbas_ground.channels.predicted_ranges import predict_ranges
 from gbas_ground.channels.tracking import RawEpoch, TrackGroup, Tracks, track
 from gbas_ground.consistency import Exclusions
 from gbas_ground.corrections.formation import range_correction_m
+from gbas_ground.corrections.second_band import BAND
 from gbas_ground.monitors.expected_range import check_expected_range
 from gbas_ground.monitors.interface import Verdict
 from gbas_ground.monitors.monitor_table import Summaries, summarise
@@ -23,7 +24,6 @@ from gbas_ground.monitors.result import MonitorResult
 from gbas_ground.monitors.signal_power import check_signal_power
 from gbas_ground.params import GroundParams
 from gbas_ground.prepared import PreparedStation
-from gbas_ground.second_band import BAND
 from gbas_ground.stages.exclusion import exclude_channels, exclude_receivers
 from gbas_ground.stages.receive import Received
 from gbas_msgs_py.codes import ExclusionCause
