@@ -118,9 +118,11 @@ def _position(state: PositionState, epoch: AirborneEpoch, params: AirborneParams
     reception, received = receive(state.reception, epoch, params)
     if received.arrival is Arrival.RESTART:
         state = PositionState()
-    located, solutions, events = state, no_positions(received, modes), received.events
+    located, events = state, received.events
     withheld: Mapping[int, Withheld] = {}
-    if received.observations is not None:
+    if received.observations is None:
+        solutions = no_positions(received, modes)
+    else:
         tracking, tracked = track(state.tracking, received, modes, params)
         correction, corrected = correct(state.correction, tracked, modes, params)
         location, found = locate(state.location, corrected, params)

@@ -88,6 +88,10 @@ class Mode:
         if unknown := set(self.monitors) - AIRBORNE_MONITORS.keys():
             raise ValueError(f"mode {self.name}: monitor {min(unknown)!r} is not one of {', '.join(AIRBORNE_MONITORS)}")
 
+    def __hash__(self) -> int:
+        """Few of the fields tell modes apart; a mode is looked up by itself many times an epoch."""
+        return hash((self.number, self.smoothing_s, self.systems))
+
     @property
     def components(self) -> tuple[tuple[Signal, float], ...]:
         """Signals with their factors in the range."""
