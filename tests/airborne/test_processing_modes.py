@@ -10,8 +10,10 @@ import pytest
 
 import dense_modes as dense
 from airborne_world import GPA_RAD, above, fas_data_set, position_of
+from gbas_airborne import receiver
 from gbas_airborne.params import AirborneParams, ServiceDParams
 from gbas_airborne.receiver import AirborneOutput, AirborneReceiver, AirborneState
+from gbas_airborne.reception.columns import B_VALUES
 from gbas_airborne.reception.station_data import final_approach
 from gbas_core.gnss.frames import geodetic_from_ecef, rot_enu_ecef
 from gbas_core.gnss.orbits import predicted_state, rotated_range
@@ -256,3 +258,54 @@ def test_combining_after_smoothing_is_smoothing_the_combination() -> None:
                 states[place], out = smooth_step(states[place], code, phase, np.zeros(N_SATS, bool), 0.5, params)
                 smoothed.append(out[0])
         assert np.abs(a1 * smoothed[0] + a5 * smoothed[1] - smoothed[2]).max() < 1e-6
+
+
+def test_without_the_second_frequency_the_next_mode_guides(monkeypatch: pytest.MonkeyPatch) -> None:
+    """IF, then L5, then C: what a mode lacks is the cause of the event of the one that guides instead."""
+    seen = world(sends_l5=lambda t: t < 10.0)
+    receive_l5(monkeypatch, seen)
+    outputs = fly(seen, replace(APPROACH, service="IF-30", modes=()), 12.0)
+    services = [int(output.protections[0].service) for output in outputs]
+    assert services[19] == ServiceType.IF_30  # 9.5 s
+    assert services[20:] == [ServiceType.C] * 5
+    assert all(output.protections[0].alert == 0.0 for output in outputs[19:])
+    event = next(e for e in outputs[20].events if e.subject.startswith("guidance/"))
+    assert (event.subject, event.cause) == ("guidance/l1_100", "no_corrections")
+    alone = fly(seen, replace(APPROACH, service="IF-30", modes=(), fallback=False), 12.0)
+    assert [int(output.protections[0].service) for output in alone][20:] == [ServiceType.NONE] * 5
+
+
+def test_b_values_of_a_combination_are_combined(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Receiver 1 is off on L1, receiver 2 on L5; a satellite with other receivers on L5 is in no combination."""
+    seen = world(b_values_m=lambda s: (0.3, -0.1, -0.1, -0.1))
+    other = seen.satellites[0]
+    receive_l5(monkeypatch, seen)
+    with_l1 = receiver.receive
+
+    def with_b(state, epoch, params):
+        state, received = with_l1(state, epoch, params)
+        sets = dict(received.corrections)
+        for name in ("l5_100", "l5_30"):
+            if name in sets:
+                columns = sets[name].columns.copy()
+                columns[B_VALUES:] = np.array([-0.05, 0.15, -0.05, -0.05])[:, np.newaxis]
+                columns[B_VALUES + 3, other] = np.nan
+                sets[name] = replace(sets[name], columns=columns)
+        return state, replace(received, corrections=sets)
+
+    monkeypatch.setattr(receiver, "receive", with_b)
+    output = fly(seen, PARAMS)[-1]
+    for solution, protection in zip(output.solutions, output.protections, strict=True):
+        if mode_of(solution.mode).signal is not Signal.L1_L5:
+            continue
+        used = np.flatnonzero(np.isfinite(solution.s_vert))
+        assert other not in used
+        expected = dense.IF_1 * np.array([0.3, -0.1, -0.1, -0.1]) + dense.IF_5 * np.array([-0.05, 0.15, -0.05, -0.05])
+        for satellite in used:
+            np.testing.assert_allclose(solution.b_m[:, satellite], expected, rtol=1e-12)
+        # H1 of the worst receiver, by the published formula and K_md of four receivers
+        s, sigma_gnd = solution.s_vert[used], solution.sigma_gnd_m[used]
+        rest = solution.sigma_air_m[used] ** 2 + solution.sigma_tropo_m[used] ** 2 + solution.sigma_iono_m[used] ** 2
+        spread = math.sqrt(float((s**2 * (4.0 / 3.0 * sigma_gnd**2 + rest)).sum()))
+        h1 = max(abs(float((s * value).sum())) + 2.878 * spread for value in expected)
+        assert protection.vpl_h1_m == pytest.approx(h1, rel=2e-4)  # the multiplier has four digits

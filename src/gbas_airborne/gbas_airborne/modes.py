@@ -24,6 +24,19 @@ PRODUCT_OF_MEASUREMENT: Final = {
 """Name of the product a type 1 message carries, by its measurement type."""
 
 
+class _Table:
+    """The contract's table as a key of what is kept: the same where it is that object."""
+
+    def __init__(self, table: tuple[Mode, ...]) -> None:
+        self.modes = table
+
+    def __hash__(self) -> int:
+        return id(self.modes)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Table) and other.modes is self.modes
+
+
 def configured_modes(params: AirborneParams) -> tuple[Mode, ...]:
     """The modes that run, each once: those that may guide, best first, what they need beside them, and the others.
 
@@ -34,16 +47,17 @@ def configured_modes(params: AirborneParams) -> tuple[Mode, ...]:
     ValueError
         When the table has no mode for that service.
     """
-    return _modes_of(modes.MODES, params)
+    return _modes_of(_Table(modes.MODES), params)
 
 
 def guiding_modes(params: AirborneParams) -> tuple[Mode, ...]:
     """The modes guidance may be from, best first."""
-    return _chain(modes.MODES, params)
+    return _chain(_Table(modes.MODES), params)
 
 
 @lru_cache(maxsize=8)
-def _chain(table: tuple[Mode, ...], params: AirborneParams) -> tuple[Mode, ...]:
+def _chain(known: _Table, params: AirborneParams) -> tuple[Mode, ...]:
+    table = known.modes
     way = next((mode for mode in table if mode.service.option == params.service), None)
     if way is None:
         raise ValueError(f"service {params.service}: no mode gives it")
@@ -56,8 +70,8 @@ def _chain(table: tuple[Mode, ...], params: AirborneParams) -> tuple[Mode, ...]:
 
 
 @lru_cache(maxsize=8)
-def _modes_of(table: tuple[Mode, ...], params: AirborneParams) -> tuple[Mode, ...]:
-    found = {mode.name: mode for mode in _chain(table, params)}
+def _modes_of(known: _Table, params: AirborneParams) -> tuple[Mode, ...]:
+    table, found = known.modes, {mode.name: mode for mode in _chain(known, params)}
     wanted = [mode for mode in table if mode.name in params.modes or (ALL_MODES in params.modes and _of(mode, params))]
     for mode in (*found.values(), *wanted):
         found.setdefault(mode.name, _limited(mode, params.systems))
