@@ -12,7 +12,7 @@ from gbas_airborne.reception.vdb_messages import reception_step
 from gbas_airborne.reception.vdb_state import ReceptionState
 from gbas_core.models.sigma_curves import sigma_gnd_m
 from gbas_core.parameters import ParameterError
-from gbas_core.satellites import IS_GALILEO, IS_GPS, N_SATS, SAT_INDEX
+from gbas_core.satellites import IS_GALILEO, IS_GPS, N_SATS, SAT_INDEX, SOURCE_ID_INDEX
 from gbas_core.signals import IONO_RATIO, L1, L5
 from gbas_ground.params import watching
 from gbas_ground.station import GroundEpoch, GroundStation
@@ -167,9 +167,13 @@ def test_power_is_of_the_band():
     assert {subject for _, kind, subject in out.told("signal_power") if kind == "exclusion"} >= {
         f"rr{row}/G01/l5" for row in range(1, 5)
     }
-    assert "G01/l5" in {subject for _, _, subject in out.told("too_few_receivers")}
+    assert {subject for _, _, subject in out.told("expected_power")} == {"G01/l5"}
     assert not on_l5(last)[SAT]
     assert usable(last)[SAT]
+    rows = {
+        row.signal.name: row.state.name for row in out.statistics[-1].select(monitor="expected_power", sat="G01").rows()
+    }
+    assert rows == {"L1": "PASSED", "L5": "FAILED"}
 
 
 def test_a_code_far_from_the_expected_range_never_enters_the_filter():
@@ -344,6 +348,38 @@ def test_a_receiver_of_one_band_gets_the_same_messages(two_bands):
         assert of_both[0] == of_both[1]
         assert {each.message_type for each in blocks(without)} <= {1, 2, 11}
         assert {each.message_type for each in blocks(with_l5)} <= {1, 2, 8, 11}
+
+
+SENDABLE = {
+    "prc_m": (-327.67, 327.67), "rrc_mps": (-32.767, 32.767), "sigma_pr_gnd_m": (1e-300, 5.08), "b_m": (-6.35, 6.35),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", list(SENDABLE))
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 0.0, -1.0, 0.5, 1e9, 1e308])
+def test_damaged_numbers_of_the_second_band_are_not_sent_and_do_not_touch_the_first(two_bands, name, value):
+    """Whatever is in the table of L5: what is sent could be sent, and types 1 and 11 are the same bits."""
+    whole = two_bands[2].integrity[-1]
+    ready = GroundStation(station(gast_d__enabled=True))
+    array = getattr(whole, name).copy()
+    array[[L5_100, L5_30]] = np.where(np.isfinite(array[[L5_100, L5_30]]), value, np.nan)
+    sent = [
+        blocks(ready.broadcast(ready.initial_state().broadcast, each)[1])
+        for each in (whole, replace(whole, **{name: array}))
+    ]
+    standard = [[each for each in frame if each.message_type in (1, 11)] for frame in sent]
+    assert standard[0] == standard[1]
+    for block in sent[1]:
+        if block.message_type == 8:
+            product = (L5_100, L5_30)[block.message.measurement_type]
+            for correction in block.message.measurements:
+                number = array[product][..., SOURCE_ID_INDEX[correction.ranging_source_id]]
+                low, high = SENDABLE[name]
+                assert ((low <= number) & (number <= high) | (np.isnan(number) & (name == "b_m"))).all()
+    n_sent = [sum(len(each.message.measurements) for each in frame if each.message_type == 8) for frame in sent]
+    assert n_sent[0] > 20
+    low, high = SENDABLE[name]
+    assert n_sent[1] == (n_sent[0] if low <= value <= high or (name == "b_m" and np.isnan(value)) else 0)
 
 
 def test_what_does_not_fit_is_the_lowest_and_is_told():
