@@ -80,6 +80,7 @@ def _satellite_columns(received: Received, result: PositionResult, fix: Fix) -> 
         result.reason, fix.sky, fix.projection, tan_gpa, result.sources.applied, checks, fix.distance_m
     )
     columns: dict[str, Any] = dict(zip(COLUMNS, rows, strict=False))
-    found = projected(result, received.approach)
-    columns["d_vert_m"], columns["d_lat_m"] = separation_m(found) if found is not None else (math.nan, math.nan)
+    columns["d_vert_m"] = columns["d_lat_m"] = 0.0
+    if result.sources.mode.beside and (found := projected(result, received.approach)):
+        columns["d_vert_m"], columns["d_lat_m"] = separation_m(found)
     return {**columns, "b_m": rows[len(COLUMNS) :], "n_sats": float(n_sats), "n_receivers": float(n_receivers)}

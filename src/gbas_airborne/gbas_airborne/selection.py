@@ -50,7 +50,7 @@ class Selected:
     Attributes
     ----------
     solutions : tuple of SolutionEpoch
-    others : tuple of ProtectionEpoch
+    worth : tuple of (Evaluation, ServiceState)
         Of the solutions after the first.
     modes : ModesEpoch or None
         All beside one another; None where there is one mode.
@@ -58,9 +58,14 @@ class Selected:
     """
 
     solutions: tuple[SolutionEpoch, ...]
-    others: tuple[ProtectionEpoch, ...] = ()
+    worth: tuple[tuple[Evaluation, ServiceState], ...] = ()
     modes: ModesEpoch | None = None
     events: tuple[Event, ...] = ()
+
+    @property
+    def others(self) -> tuple[ProtectionEpoch, ...]:
+        """Protection of the solutions after the first."""
+        return tuple(protection_of(each, *worth) for each, worth in zip(self.solutions[1:], self.worth, strict=True))
 
 
 def select(
@@ -90,10 +95,10 @@ def select(
         for each in solutions
     }
     ordered = sorted(solutions, key=lambda each: int(each.mode) != guiding)
-    others = tuple(protection_of(each, evaluations[int(each.mode)], services[int(each.mode)]) for each in ordered[1:])
+    worth = tuple((evaluations[int(each.mode)], services[int(each.mode)]) for each in ordered[1:])
     selected = Selected(
         solutions=tuple(ordered),
-        others=others,
+        worth=worth,
         modes=_table(solutions, evaluations, services, guiding),
         events=_changes(state.guiding, guiding, chain, evaluations, solutions[0]),
     )

@@ -13,6 +13,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,7 @@ from gbas_airborne.ranging.own_ranges import DIVERGENCE, SmoothedRanges, Tracked
 from gbas_airborne.reception.columns import B_VALUES, SIGMA
 from gbas_airborne.reception.receive import Received
 from gbas_core.gnss.ephemeris import Ephemeris
-from gbas_core.record import BoolArray, FloatArray
+from gbas_core.record import BoolArray, FloatArray, IntArray
 from gbas_core.satellites import missing, satellites_of
 from gbas_msgs_py.codes import Rejection
 from gbas_msgs_py.modes import Mode
@@ -200,6 +201,44 @@ def _younger(ranges: tuple[SmoothedRanges, ...]) -> FloatArray:
     return ranges[0].settled_s if len(ranges) == 1 else np.minimum(ranges[0].settled_s, ranges[1].settled_s)
 
 
+class _Plan(NamedTuple):
+    """What of a set of modes is the same at every epoch, as arrays; products by their place among those there are."""
+
+    coefficient: FloatArray
+    tau_s: FloatArray
+    level_tau_s: FloatArray
+    model_tau_s: FloatArray
+    product: IntArray
+    level_product: IntArray
+    systems: BoolArray
+
+
+@lru_cache(maxsize=16)
+def _plan(modes: tuple[Mode, ...], products: tuple[str, ...], aad: str) -> _Plan:
+    processing = [processing_of(mode) for mode in modes]
+    return _Plan(
+        coefficient=np.array([each.coefficient for each in processing]),
+        tau_s=np.array([mode.smoothing_s for mode in modes]),
+        level_tau_s=np.array([each.tau_s[0] for each in processing]),
+        model_tau_s=np.array([air_model(mode, aad).tau_s for mode in modes]),
+        product=np.array([[products.index(name) for name in pair(mode.products)] for mode in modes]),
+        level_product=np.array([[products.index(name) for name in pair(mode.level_products)] for mode in modes]),
+        systems=np.array([satellites_of(mode.systems) for mode in modes]),
+    )
+
+
+def _measured(signals: list[tuple[SmoothedRanges, ...]]) -> FloatArray:
+    """Raw and smoothed code and age of the filter of each mode and signal, (M, 2, 3, N)."""
+    places: dict[int, int] = {}
+    rows: list[tuple[FloatArray, FloatArray, FloatArray]] = []
+    for each in (each for of_mode in signals for each in of_mode):
+        if id(each) not in places:
+            places[id(each)] = len(rows)
+            rows.append((each.code_m, each.smoothed_m, each.settled_s))
+    measured: FloatArray = np.array(rows)[[[places[id(each)] for each in pair(of_mode)] for of_mode in signals]]
+    return measured
+
+
 def _sources(
     modes: list[Mode],
     ranges: Mapping[int, tuple[SmoothedRanges, ...]],
@@ -213,23 +252,21 @@ def _sources(
     assert station is not None
     own = [matched[name] for name in products]
     age_s = np.array([received.since_s((each.gps_week, each.tow_s)) for each in sets])
-    processing = [processing_of(mode) for mode in modes]
-    place = np.array([[products.index(name) for name in pair(mode.products)] for mode in modes])
-    measured = [ranges[mode.number] for mode in modes]
+    plan, measured = _plan(tuple(modes), products, params.aad), [ranges[mode.number] for mode in modes]
     reason, range_m, weight_sigma_m, applied, satellite_m, factor = correct_ranges(
-        np.array([[(each.code_m, each.smoothed_m, each.settled_s) for each in pair(signals)] for signals in measured]),
-        np.array([each.coefficient for each in processing]),
-        np.array([mode.smoothing_s for mode in modes]),
-        np.array([each.tau_s[0] for each in processing]),
-        np.array([air_model(mode, params.aad).tau_s for mode in modes]),
-        place,
-        np.array([[products.index(name) for name in pair(mode.level_products)] for mode in modes]),
+        _measured(measured),
+        plan.coefficient,
+        plan.tau_s,
+        plan.level_tau_s,
+        plan.model_tau_s,
+        plan.product,
+        plan.level_product,
         np.array([each.columns for each in sets]),
         age_s,
         np.array([each.ephemeris.values for each in own]),
         np.array([each.crc for each in own]),
         received.checks.columns,
-        np.array([satellites_in(mode.systems) for mode in modes]),
+        plan.systems,
         int(received.gps_week),
         float(received.tow_s),
         int(station.n_receivers),
@@ -250,14 +287,8 @@ def _sources(
             weight_sigma_m=weight_sigma_m[row],
             noise_factor=factor[row],
             settled_s=_younger(measured[row]),
-            age_s=float(age_s[place[row]].max()),
-            own_crc=own[place[row, 0]].crc,
+            age_s=float(age_s[plan.product[row]].max()),
+            own_crc=own[plan.product[row, 0]].crc,
         )
         for row, mode in enumerate(modes)
     }
-
-
-@lru_cache(maxsize=8)
-def satellites_in(letters: str) -> BoolArray:
-    """Satellites of systems, kept."""
-    return satellites_of(letters)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Final
 
 import numpy as np
@@ -75,16 +75,21 @@ class Tracked:
     divergence: Divergence | None = None
 
     def ranges(self, mode: Mode) -> tuple[SmoothedRanges, ...]:
-        """The ranges a mode works with, one a signal."""
-        place = self.tau_s.index(mode.smoothing_s)
-        return tuple(
-            SmoothedRanges(
+        """The ranges a mode works with, one a signal; modes of one signal and time constant share them."""
+        return tuple(self._smoothed[band, mode.smoothing_s] for band in bands_of(mode))
+
+    @cached_property
+    def _smoothed(self) -> dict[tuple[int, float], SmoothedRanges]:
+        """By band and time constant."""
+        return {
+            (band, tau_s): SmoothedRanges(
                 code_m=self.code_m[band],
                 smoothed_m=self.channels.smoothed_of(band)[place, 0],
                 settled_s=self.channels.age_of(band)[0],
             )
-            for band in bands_of(mode)
-        )
+            for band in self.channels.bands
+            for place, tau_s in enumerate(self.tau_s)
+        }
 
 
 @lru_cache(maxsize=8)
