@@ -179,7 +179,8 @@ def test_power_is_of_the_band():
 def test_a_code_far_from_the_expected_range_never_enters_the_filter():
     spike = lambda s: at(None, SAT, 500.0 if s == 12.0 else 0.0)  # noqa: E731
     out = run(truth(4), station(), half_seconds(60), change=both_bands(spike))
-    assert {subject for _, _, subject in out.told("range_residual")} == {f"rr{row}/G01/l5" for row in range(1, 5)}
+    everyone = {"G01/l5", *(f"rr{row}/G01/l5" for row in range(1, 5))}
+    assert {subject for _, _, subject in out.told("range_residual")} == everyone
     gone = [
         second
         for second, each in zip(out.seconds, out.integrity, strict=True)
@@ -231,6 +232,21 @@ def test_without_l1_there_is_no_l5():
     last = run(truth(4), station(), half_seconds(30), change=change).integrity[-1]
     assert not usable(last)[SAT]
     assert not on_l5(last)[SAT]
+
+
+@pytest.mark.parametrize(("receivers", "cause"), [((0, 1, 2, 3), "not_tracked"), ((0, 1, 2), "too_few_receivers")])
+def test_a_signal_that_is_lost_says_so(receivers, cause):
+    """L5 of one satellite gone at all receivers, or at all but one where two are needed."""
+
+    def change(second, observed):
+        both = both_bands()(second, observed)
+        for row in receivers if second >= 10.0 else ():
+            both[row].code_m[L5, SAT] = both[row].carrier_m[L5, SAT] = np.nan
+        return both
+
+    out = run(truth(4), station(), half_seconds(24), change=change)
+    assert [(second, subject) for second, kind, subject in out.told(cause) if kind == "exclusion"] == [(10.0, "G01/l5")]
+    assert usable(out.integrity[-1])[SAT]
 
 
 def test_only_what_is_asked_for_is_made():

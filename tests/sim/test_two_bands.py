@@ -26,7 +26,7 @@ def flown():
     """Errors of each mode in the approach frame within 1.5 km of the threshold, and the last integrity."""
     quiet = {"noise_scale": 0.0}
     flight = {"level_time_s": 220.0, "intercept_distance_m": 4000.0}
-    sim = {"flight": flight, "ground_receiver": quiet, "airborne_receiver": quiet}
+    sim = {"interval_s": 1.0, "flight": flight, "ground_receiver": quiet, "airborne_receiver": quiet}
     world = World(scenario_from_mapping({"ground": TWO_BANDS, "sim": sim}))
     airborne = AirborneParams.from_mapping({"systems": "GE", "rpds": 0, "modes": ["all"]})
     chain = Chain(GroundParams.from_mapping(TWO_BANDS), airborne, [world.ephemeris], [world.ephemeris])

@@ -13,10 +13,12 @@ from typing import Any
 
 from gbas_msgs_py.tables import schema_dictionary
 
+_OPTIONAL = "; optional"
 _HEAD = """# The contract: tables, codes, products, modes and monitors
 
 Made by `python -m gbas_msgs_py.document`; the same stands as JSON on `/gbas/schemas` and in the metadata of every bag.
-Numbers are never given a second meaning. NaN is missing everywhere."""
+Numbers are never given a second meaning. NaN is missing everywhere. A table has its optional columns where
+one of them has a value."""
 
 
 def contract_text() -> str:
@@ -123,7 +125,10 @@ def _tables(contract: dict[str, Any]) -> Iterator[str]:
         yield f"\n## {schema['schema']}\n\n{schema['doc']}\n"
         yield from _table(
             ("column", "unit", "meaning"),
-            ((f"`{column['name']}`", column["unit"], column["doc"]) for column in schema["columns"]),
+            (
+                (f"`{column['name']}`", column["unit"], column["doc"] + (_OPTIONAL if column.get("optional") else ""))
+                for column in schema["columns"]
+            ),
         )
 
 

@@ -161,14 +161,14 @@ class TableSchema(Generic[R]):
         return self.label if table.shape[1] == len(self.columns) else self._short_label
 
     def describe(self) -> dict[str, Any]:
-        """Schema as JSON-able data: label, and each column with its unit and meaning."""
+        """Schema as JSON-able data: label, and each column with its unit and meaning, and whether it is optional."""
         return {
             "schema": self.identifier,
             "label": self.label,
             "doc": (self.record_type.__doc__ or "").strip().split("\n")[0],
             "columns": [
-                {"name": name, "unit": unit, "doc": doc}
-                for name, (unit, doc) in zip(self.columns, self._descriptions, strict=True)
+                {"name": name, "unit": unit, "doc": doc} | ({} if place < self._n_always else {"optional": True})
+                for place, (name, (unit, doc)) in enumerate(zip(self.columns, self._descriptions, strict=True))
             ],
         }
 

@@ -141,7 +141,13 @@ def second_band(
     sent_m = _sent_sigmas_m(corrections, decided)
     usable = _usable(corrections, sent_m, exclusions.satellites, decided.status.usable, params.receivers.minimum)
     told = {finding.subject for finding in (*of_signals, *of_corrections, *of_sigmas)}
-    _tell_changes(state.usable, usable, decided.status.usable, exclusions.satellites, told, now.events)
+    for satellite in np.flatnonzero(state.usable != usable) if (state.usable != usable).any() else ():
+        subject = SAT_IDS[satellite]
+        if usable[satellite]:
+            now.events.add(EventKind.READMISSION, subject + SUFFIX, "used")
+        elif decided.status.usable[satellite] and subject not in told:  # with L1 it goes without a further word
+            cause = _reason(int(satellite), inputs, corrections, sent_m, exclusions, params.receivers.minimum)
+            now.events.add(EventKind.EXCLUSION, subject + SUFFIX, cause.word)
     exclusions = advanced(
         exclusions, inputs, corrections, agreement,
         lambda: SeenToPass(
@@ -253,14 +259,27 @@ def _tell(findings: tuple[Finding, ...], events: EventLog) -> None:
         events.add(EventKind.EXCLUSION, each.subject + SUFFIX, each.cause.word, each.value, each.threshold)
 
 
-def _tell_changes(
-    before: BoolArray, usable: BoolArray, usable_l1: BoolArray, satellites: Latch, told: set[str], events: EventLog
-) -> None:
-    """Satellites that came into use here or went out of it; with L1 they go without a further word."""
-    for satellite in np.flatnonzero(before != usable) if (before != usable).any() else ():
-        subject = SAT_IDS[satellite]
-        if usable[satellite]:
-            events.add(EventKind.READMISSION, subject + SUFFIX, "used")
-        elif usable_l1[satellite] and subject not in told:
-            cause = ExclusionCause(int(satellites.cause[satellite])) or ExclusionCause.TOO_FEW_RECEIVERS
-            events.add(EventKind.EXCLUSION, subject + SUFFIX, cause.word)
+def _reason(
+    satellite: int,
+    inputs: CorrectionInputs,
+    corrections: Corrections,
+    sigmas_m: FloatArray,
+    exclusions: Exclusions,
+    min_receivers: int,
+) -> ExclusionCause:
+    """Why a satellite that is usable on L1 has no corrections here; the first that holds, as on L1."""
+    latched = int(exclusions.satellites.cause[satellite])
+    if latched:
+        return ExclusionCause(latched)
+    if corrections.count[satellite] < min_receivers:
+        of_channels = int(exclusions.channels.cause[:, satellite].max(initial=0))
+        if of_channels:
+            return ExclusionCause(of_channels)
+        if np.isnan(inputs.correction_m[:, :, satellite]).all():
+            return ExclusionCause.NOT_TRACKED
+        if not inputs.judged[satellite]:
+            return ExclusionCause.UNMONITORED
+        few = np.count_nonzero(inputs.settled[:, satellite]) < min_receivers
+        return ExclusionCause.TOO_FEW_RECEIVERS if few else ExclusionCause.TOO_FEW_COMMON_SATELLITES
+    fits = ((sigmas_m[:, satellite] > 0.0) & (sigmas_m[:, satellite] <= MAX_SIGMA_M)).all()
+    return ExclusionCause.NO_RATE if fits else ExclusionCause.SIGMA_TOO_LARGE
