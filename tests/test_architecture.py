@@ -79,7 +79,9 @@ ROOMS = {
         "navigation",
         "report",
         "protection",
+        "conditions",
         "service",
+        "selection",
         "receiver",
         "abia",
         "nodes",
@@ -243,7 +245,6 @@ its options (every argument annotated for typer), and a compiled kernel, which t
 _RECORD = "open: its arguments want a record"
 TOO_LARGE: dict[str, str] = {
     "gbas_core/ranging/divergence.py:_advanced": _RECORD,
-    "gbas_ground/consistency.py:readmission_state": "open: needs a record of what monitors say, from the stage asking",
     "gbas_ground/monitors/divergence_covariance.py:calibrate": _RECORD,
     "gbas_ground/monitors/divergence_covariance.py:measurement_covariance": _RECORD,
     "gbas_ground/monitors/ephemeris_residual.py:site_decorrelation": _RECORD,

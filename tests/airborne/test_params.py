@@ -15,7 +15,7 @@ from gbas_core.parameters import ParameterError
     ("values", "words"),
     [
         ({"aad": "C"}, "airborne.aad = 'C' is not one of 'A', 'B'"),
-        ({"service": "D"}, "airborne.service = 'D' is not one of 'C'"),
+        ({"service": "E"}, "airborne.service = 'E' is not one of 'C', 'D', 'L5-100', 'L5-30', 'IF-100', 'IF-30'"),
         ({"systems": ""}, "airborne.systems = '' is not one of 'G', 'E', 'GE', 'EG'"),
         ({"systems": "GR"}, "airborne.systems = 'GR' is not one of 'G', 'E', 'GE', 'EG'"),
         ({"systems": "GG"}, "airborne.systems = 'GG' is not one of 'G', 'E', 'GE', 'EG'"),

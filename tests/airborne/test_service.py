@@ -59,7 +59,7 @@ def assert_no_guidance(flight: Flight, cause: str) -> None:
     assert protection.service == ServiceType.NONE
     assert math.isnan(protection.vpl_m)
     assert math.isnan(protection.lpl_m)
-    assert flight.state.service[1].cause == cause
+    assert flight.state.service.cause == cause
     assert any(e.kind == EventKind.ALERT and e.cause == cause for e in flight.events)
 
 
@@ -236,7 +236,7 @@ def test_approach_without_limits(limits: dict[str, float]) -> None:
     flight = flying(world)
     assert flight.protections[-1].alert == 1.0
     assert flight.protections[-1].service == ServiceType.NONE
-    assert flight.state.service[1].cause in ("vpl_above_val", "lpl_above_lal")
+    assert flight.state.service.cause in ("vpl_above_val", "lpl_above_lal")
 
 
 def test_approach_withdrawn() -> None:
@@ -287,7 +287,7 @@ def test_lateral_level_above_the_limit() -> None:
     assert protection.vpl_m <= protection.val_m
     assert protection.lpl_m > protection.lal_m
     assert protection.alert == 1.0
-    assert flight.state.service[1].cause == "lpl_above_lal"
+    assert flight.state.service.cause == "lpl_above_lal"
 
 
 def test_ephemeris_bound_above_the_limit() -> None:
@@ -298,7 +298,7 @@ def test_ephemeris_bound_above_the_limit() -> None:
     _, protection, _ = flight.step(DURATION_S)
     assert protection.vpl_m <= protection.val_m < protection.veb_m
     assert protection.alert == 1.0
-    assert flight.state.service[1].cause == "veb_above_val"
+    assert flight.state.service.cause == "veb_above_val"
 
 
 @pytest.mark.parametrize("name", ["x_m", "gcid", "message_age_s", "correction_age_s", "n_receivers", "apd", "k_md_e"])

@@ -37,7 +37,9 @@ def test_the_bag_is_small_whole_and_labelled() -> None:
 @pytest.mark.ros
 def test_replay_gives_the_recorded_numbers(tmp_path: Path) -> None:
     result = replay(ReplayRequest(bag=BAG, out=tmp_path, quiet=True))
-    assert {topic.name for topic in result.topics} == set(NAMES.values())
+    # one mode runs in the bag, so that there is no table of all of them
+    of_one_mode = {name for topic, name in NAMES.items() if topic != topics.AIRBORNE_MODES}
+    assert {topic.name for topic in result.topics} == of_one_mode
     recorded_on = info(BAG).metadata[bags.SUITE_METADATA].get(bags.VECTOR_METADATA)
     if recorded_on in (None, vector_instructions()):
         assert [difference(topic) for topic in result.topics if differs(topic)] == []

@@ -45,7 +45,7 @@ from gbas_core.gnss.gpstime import add_seconds, from_epoch_key, modified_z_count
 from gbas_core.gnss.observations import ObservationEpoch
 from gbas_core.satellites import N_SATS, RANGING_SOURCE_ID, SAT_INDEX
 from gbas_ground.broadcast import BroadcastState
-from gbas_msgs_py.products import L1_100
+from gbas_msgs_py.products import L1_30, L1_100
 from gbas_msgs_py.records import IntegrityEpoch, SolutionEpoch
 from gbas_vdb.messages.types import Correction100, Message, Type1, Type2
 from gbas_vdb.transmission.burst import Burst
@@ -732,7 +732,8 @@ def test_damaged_integrity_is_not_broadcast(records, name, value):
     for satellite, (measurement, first_p) in _sent(damaged, chain).items():
         for column, (low, high) in SENDABLE.items():
             number = getattr(damaged, column)
-            sent = np.asarray(number if np.ndim(number) == 0 else number[..., satellite])  # of every product
+            made = number[[L1_100, L1_30]] if np.ndim(number) > 1 else number  # of every product the station makes
+            sent = np.asarray(made if np.ndim(number) == 0 else made[..., satellite])
             assert ((low <= sent) & (sent <= high)).all(), column
         b_m = damaged.b_m[L1_100, :, satellite]
         assert (np.isnan(b_m) | (np.abs(b_m) <= 6.35)).all()

@@ -45,7 +45,7 @@ def bag(fake_bag: Any, tmp_path: Path) -> Path:
     "command",
     [(), ("demo",), ("run",), ("launch-list",), ("process",), ("replay",), ("bench",), ("bag",), ("bag", "info"),
      ("bag", "check"), ("bag", "recover"), ("config",), ("config", "show"), ("config", "check"), ("config", "schema"),
-     ("vdb",), ("vdb", "decode"), ("vdb", "encode")],
+     ("vdb",), ("vdb", "decode"), ("vdb", "encode"), ("vdb", "budget")],
 )  # fmt: skip
 def test_help_of_every_command(command: tuple[str, ...]) -> None:
     result = gbas(*command, "--help")
@@ -289,3 +289,34 @@ def test_launch_list() -> None:
     document = json.loads(gbas("launch-list", "--json").stdout)
     assert "braunschweig" in document["configurations"]
     assert "recorder" in document["nodes"]
+
+
+# --- the VDB's budget
+
+
+def test_budget_says_what_fits_and_what_does_not() -> None:
+    """Two bands of 20 satellites: 254 + 168 bytes of types 1 and 11, and 250 of each private message (by hand in
+    tests/vdb/transmission/test_budget.py)."""
+    found = json.loads(gbas("vdb", "budget", "--satellites", "G:11,E:9", "--bands", "2", "--json").stdout)
+    assert [each["bytes_per_frame"] for each in found["messages"] if each["message_type"] in (1, 8, 11)] == [
+        254.0, 250.0, 250.0, 168.0,
+    ]  # fmt: skip
+    assert (found["satellites"], found["left_out"], found["second_left_out"]) == (20, 0, 0)
+    text = gbas("vdb", "budget", "--satellites", "G:11,E:9", "--bands", "2", "--slots", "AB").stdout
+    assert "18 of 20 fit" in text
+    assert "second band: 0 of 18 fit" in text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "wrong"),
+    [
+        (("--satellites", "R:4"), "'R:4' is not a system"),
+        (("--satellites", "G:4,G:5"), "'G:5' is not a system (G, E), once"),
+        (("--satellites", "G:33"), "33 is more than the 32"),
+        (("--satellites", "G:4", "--slots", "BA"), "--slots 'BA'"),
+        (("--satellites", "G:4", "--service", "E"), "--service 'E' is not C or D"),
+        (("--satellites", "G:4", "--bands", "2", "--second", "60"), "--second '60'"),
+    ],
+)
+def test_budget_refuses_in_one_line(arguments: tuple[str, ...], wrong: str) -> None:
+    assert wrong in fails("vdb", "budget", *arguments)

@@ -139,6 +139,8 @@ def test_service_type_d_needs_the_gradient_monitor():
     assert (
         run(truth(1), params(1, receivers__minimum=1), half_seconds(30)).integrity[-1].state[G02] == ChannelState.USABLE
     )
+    unclaimed = params(1, **one, gast_d__required=False, station__gcid=7)  # for recorded data
+    assert run(truth(1), unclaimed, half_seconds(30)).integrity[-1].state[G02] == ChannelState.USABLE
 
 
 def test_a_quiet_station_passes_everything_and_every_table_can_be_sent():

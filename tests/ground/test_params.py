@@ -206,3 +206,14 @@ def test_reference_point_and_receivers():
     assert height == pytest.approx(station.station.height_m, abs=1e-6)  # rounding of 6e6 m through the transformation
     assert station.receiver_positions_m().shape == (3, 3)
     assert np.linalg.norm(station.receiver_positions_m() - station.reference_point_m(), axis=1).max() < 600.0
+
+
+@pytest.mark.parametrize("gcid", [1, 2])
+def test_gast_d_without_its_monitors_only_from_a_station_that_claims_nothing(gcid):
+    bare = {"enabled": True, "required": False}
+    station = {**MINIMAL["station"], "systems": "G"}
+    allowed = GroundParams.from_mapping(changed(gast_d=bare, vdb={"slots": "ABC"}))
+    assert allowed.station_message().gcid == GCID_UNHEALTHY
+    assert not allowed.gast_d.demands_monitors
+    with pytest.raises(ParameterError, match=rf"gast_d.required = false with station.gcid = {gcid}, expected 7"):
+        GroundParams.from_mapping(changed(station=station | {"gcid": gcid}, gast_d=bare, vdb={"slots": "ABC"}))

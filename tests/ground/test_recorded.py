@@ -17,7 +17,7 @@ from gbas_ground.params import GroundParams, watching
 from gbas_ground.station import GroundEpoch, GroundStation
 from gbas_msgs_py.codes import ChannelState
 from gbas_msgs_py.joining import ReceptionQueue
-from gbas_msgs_py.products import L1_30, L1_100
+from gbas_msgs_py.products import L1_30, L1_100, L5_30, L5_100
 from ground_runs import receiver_values
 
 SETS = yaml.safe_load((Path(__file__).parents[1] / "tables" / "recorded_sets.yaml").read_text())
@@ -151,3 +151,30 @@ def test_gps_and_galileo(data_dir, name):
         prc = stacked(integrity, "prc_m")[-1, L1_100, constellation]
         assert np.nansum(prc) == pytest.approx(0.0, abs=1e-6)  # a plain mean was removed
         assert np.nanmax(np.abs(prc)) < 40.0
+
+
+def test_second_band_of_a_recorded_pair(data_dir):
+    """Two receivers 1 m apart as a station: L5 and E5a of what is usable on L1, clocks removed band by band."""
+    chosen = SETS["mosaic_base_rover"]
+    files = [data_dir / path for path in (*chosen["ground"], chosen["user"])]
+    recording = Recording.open(files, None, [data_dir / path for path in chosen["navigation"]])
+    positions_m = [*chosen["ground_xyz_m"], chosen["user_xyz_m"]]
+    changes = {
+        "station__systems": "GE", "vdb__slots": "ABCDEF", "second_band__products": ("l5_100", "l5_30"),
+        "receivers__minimum": 1, "ccd_f__exclude": "none",
+    }  # fmt: skip
+    integrity, events = run(recording, station_at(positions_m, **changes))
+    prc = stacked(integrity, "prc_m")
+    there = np.isfinite(prc[:, L5_100])
+    assert not (there & ~np.isfinite(prc[:, L1_100])).any()
+    assert there[-1, :32].sum() >= 4
+    assert there[-1, 32:].sum() >= 4
+    for constellation in (slice(0, 32), slice(32, 68)):
+        for product in (L5_100, L5_30):
+            common = (integrity[-1].receiver_used[product, :2] == 1.0).all(axis=0)  # others have one receiver only
+            own = prc[-1, product, constellation][common[constellation]]
+            assert own.sum() == pytest.approx(0.0, abs=1e-6)
+    # designator A: its surrogate bounds the pair, and is not suspiciously large
+    normalised = stacked(integrity, "b_m")[:, L5_100, 0] / stacked(integrity, "sigma_pr_gnd_m")[:, L5_100]
+    assert 0.05 < np.nanstd(normalised) < 1.0
+    assert not [event for event in events if event.cause in ("b_value", "range_residual")]

@@ -73,16 +73,16 @@ def test_every_member_is_explained():
 
 def test_products_and_modes_are_unique():
     assert len(PRODUCT_INDEX) == len(PRODUCTS)
-    assert len({product.message_type for product in PRODUCTS}) == len(PRODUCTS)
+    assert len({(product.message_type, product.measurement_type) for product in PRODUCTS}) == len(PRODUCTS)
     assert len({mode.number for mode in MODES}) == len({mode.name for mode in MODES}) == len(MODES)
     assert mode_of(1.0).name == "l1_100"
-    with pytest.raises(ValueError, match=r"mode 7 is none of 1 \(l1_100\)"):
+    with pytest.raises(ValueError, match=r"mode 7 is none of 1 \(l1_100\), 2 \(l1_30\)"):
         mode_of(7.0)
 
 
 def test_a_mode_needs_a_product_that_is_broadcast():
-    values = {"name": "toy", "signal": Signal.L5, "smoothing_s": 100.0, "service": ServiceType.NONE, "doc": "toy"}
-    with pytest.raises(ValueError, match="product 'l5_100' is not one of l1_100, l1_30"):
-        Mode(number=99, product="l5_100", **values)
+    values = {"name": "toy", "signal": Signal.L2, "smoothing_s": 100.0, "service": ServiceType.NONE, "doc": "toy"}
+    with pytest.raises(ValueError, match="product 'l2_100' is not one of l1_100, l1_30, l5_100, l5_30"):
+        Mode(number=99, products=("l2_100",), **values)
     with pytest.raises(ValueError, match="number is 0"):
-        Mode(number=0, product="l1_100", **values)
+        Mode(number=0, products=("l1_100",), **values)

@@ -169,7 +169,8 @@ monitors.MONITORS += (toy,)
 monitors.TESTS[99, 1] = (toy, test)
 products.PRODUCTS += (products.Product(name="l5_60", signal=Signal.L5, smoothing_s=60.0, message_type=12, doc="toy"),)
 from gbas_msgs_py import modes
-values = {"signal": Signal.L5, "smoothing_s": 60.0, "product": "l5_60", "service": modes.MODES[0].service, "doc": "toy"}
+values = {"signal": Signal.L5, "smoothing_s": 60.0, "products": ("l5_60",), "doc": "toy"}
+values["service"] = modes.MODES[0].service
 modes.PRODUCT_INDEX["l5_60"] = 2
 modes.MODES += (modes.Mode(number=99, name="l5_60", **values),)
 import numpy as np
@@ -201,7 +202,7 @@ def test_a_toy_monitor_product_and_mode_need_one_entry_each() -> None:
     assert dictionary["monitors"][-1]["tests"] == [
         {"number": 1, "name": "size", "cause": "carrier_step", "unit": "m", "doc": "size of the toy"}
     ]
-    assert dictionary["products"][-1]["name"] == dictionary["modes"][-1]["product"] == "l5_60"
+    assert dictionary["products"][-1]["name"] == dictionary["modes"][-1]["products"][0] == "l5_60"
     for line in (
         "| `toy` | `size` | 99, 1 |",
         "| `l5_60` | L5 | 60 s | 12 | toy |",

@@ -20,6 +20,7 @@ from gbas_core.io.recording import RecordedEpoch, Recording
 from gbas_ground.params import GroundParams
 from gbas_msgs_py import tables, topics
 from gbas_msgs_py.codes import EventKind
+from gbas_msgs_py.modes import MODES
 
 pytestmark = pytest.mark.ros
 
@@ -65,11 +66,13 @@ def files(data_dir: Path) -> dict[str, Any]:
     }
 
 
-def offline(files: dict[str, Any], epochs: slice) -> list[GroundOutput | AirborneOutput]:
+def offline(
+    files: dict[str, Any], epochs: slice, ground: dict[str, Any] = STATION, airborne: dict[str, Any] = RECEIVER
+) -> list[GroundOutput | AirborneOutput]:
     recording = Recording.open(files["ground_files"], files["user_file"], files["nav_files"])
     chain = Chain(
-        GroundParams.from_mapping(STATION),
-        AirborneParams.from_mapping(RECEIVER),
+        GroundParams.from_mapping(ground),
+        AirborneParams.from_mapping(airborne),
         recording.ephemerides(),
         recording.user_ephemerides(),
     )
@@ -79,7 +82,7 @@ def offline(files: dict[str, Any], epochs: slice) -> list[GroundOutput | Airborn
 
 
 def start_chain(launcher: Any, own_ephemerides: bool, **more: Any) -> None:
-    parameters = {"ground": STATION, "airborne": RECEIVER, "start_wait_s": 60.0, **more}
+    parameters: dict[str, Any] = {"ground": STATION, "airborne": RECEIVER, "start_wait_s": 60.0, **more}
     for module in CHAIN:
         joins = module.endswith(("integrity_monitor", "positioning"))
         remap = ("-r", "/gbas/ephemeris:=/gbas/airborne/ephemeris") if own_ephemerides else ()
@@ -140,3 +143,62 @@ def test_live_nodes_give_the_bits_of_the_offline_chain(
     probe.until(lambda: len(events) > len(expected_events), "the last event")
     told = sorted((e.epoch, e.subject, e.cause) for e in events if e.kind is not EventKind.FINISHED)
     assert told == sorted((e.epoch, e.subject, e.cause) for e in expected_events)
+
+
+TWO_BANDS = "static_pair_L1L5_2024"
+STATION_OF_ALL: dict[str, Any] = {
+    "station": {
+        "id": "TEST", "gcid": 7, "latitude_deg": 35.1332, "longitude_deg": 136.9777, "height_m": 90.0, "systems": "GE",
+    },
+    "receivers": {"rr1_ecef_m": [-3817681.1213, 3562839.4311, 3650159.1593], "minimum": 1},
+    "smoothing": {"settle_time_s": 20.0},
+    "gast_d": {"enabled": True, "required": False},
+    "second_band": {"products": ["l5_100", "l5_30"]},
+    "vdb": {"slots": "ABCDEFGH"},
+}  # fmt: skip
+RECEIVER_OF_ALL: dict[str, Any] = {
+    **RECEIVER,
+    "service": "D",
+    "modes": ["all"],
+    "use_unhealthy": True,
+    "gast_d": {"require_authentication": False, "divergence_settle_s": 20.0, "step_in_s": 2.0},
+}
+
+
+def test_all_modes_live_have_the_bits_of_the_offline_chain(launcher: Any, probe: Any, data_dir: Path) -> None:
+    """Every mode beside GAST-D: one table an epoch, and still one solution and one protection."""
+    folder = data_dir / TWO_BANDS
+    files = {
+        "ground_files": [str(folder / "base.obs.gz")],
+        "user_file": str(folder / "rover.obs.gz"),
+        "nav_files": [str(folder / "base.nav.gz")],
+        "systems": "GE",
+    }
+    solutions, protections = probe.listen(topics.AIRBORNE_SOLUTION), probe.listen(topics.AIRBORNE_PROTECTION)
+    modes, events = probe.listen(topics.AIRBORNE_MODES), probe.events()
+    probe.report_progress(topics.AIRBORNE_PROTECTION)
+    # every output waits for its recorder, this one; what is not looked at is heard all the same
+    for topic in (
+        topics.GROUND_INTEGRITY, topics.GROUND_MONITORS, topics.GROUND_MONITOR_DETAILS, topics.GROUND_CHANNELS,
+    ):  # fmt: skip
+        probe.listen(topic)
+    probe.bursts()
+    probe.listen(topics.AIRBORNE_FIX, NavSatFix)
+    probe.listen(topics.AIRBORNE_SERVICE, UInt8)
+    for topic in SCALARS.values():
+        probe.listen(topic, Float64)
+    start_chain(launcher, False, recorders=1, ground=STATION_OF_ALL, airborne=RECEIVER_OF_ALL)
+    replay = launcher.start(REPLAY, {**files, "speed": 0.0, "stop_s": float(SECONDS), **WAITING})
+    expected = offline(files, slice(0, SECONDS + 1), STATION_OF_ALL, RECEIVER_OF_ALL)
+    airborne = [each for each in expected if isinstance(each, AirborneOutput)]
+    probe.until(lambda: any(event.kind is EventKind.FINISHED for event in events), "the end of the replay", 300.0)
+    assert replay.wait() == 0, replay.output
+    probe.until(lambda: min(map(len, (solutions, protections, modes))) >= len(airborne), "the last table")
+    assert raw(tables.MODES, modes) == raw(tables.MODES, [each.modes for each in airborne])
+    assert raw(tables.SOLUTION, solutions) == raw(tables.SOLUTION, [each.solution for each in airborne])
+    assert raw(tables.PROTECTION, protections) == raw(tables.PROTECTION, [each.protection for each in airborne])
+    last = airborne[-1].modes
+    assert last is not None
+    assert len(last.mode) == len(MODES)
+    assert np.isfinite(last.vpl_m).sum() >= 12  # of GPS alone, and of Galileo, there may be too few on L5
+    assert {2.0, 3.0, 6.0} <= set(last.mode[np.isfinite(last.vpl_m)].tolist())

@@ -80,7 +80,7 @@ def table_bytes(record: Record, label: str | None = None) -> bytes:
     schema = next(each for each in tables.SCHEMAS.values() if each.record_type is type(record))
     table = schema.encode(record)
     rows, columns = table.shape
-    layout = _layout([("rows", rows, rows * columns), (label or schema.label, columns, columns)])
+    layout = _layout([("rows", rows, rows * columns), (label or schema.label_of(table), columns, columns)])
     return bytes(STORE.serialize_cdr(STORE.types[TABLE](layout=layout, data=table.ravel()), TABLE))
 
 

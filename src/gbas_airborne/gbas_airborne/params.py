@@ -14,20 +14,104 @@ from typing import Annotated, Any, Final, Literal
 
 from gbas_core.configuration import read_configuration
 from gbas_core.parameters import Parameter, ParameterError, from_mapping, parameters
+from gbas_core.ranging.divergence import AIRBORNE, AIRBORNE_THRESHOLD_MPS
 from gbas_core.ranging.slips import NORMAL_MANOEUVRE_JERK_MPS3
+from gbas_msgs_py import modes
 from gbas_vdb.transmission.burst import SLOT_NAMES
 
 SECTION: Final = "airborne"
 NO_FAS: Final = -1
 MAX_RPDS: Final = 48
+ALL_MODES: Final = "all"
+OF_LEVELS: Final = "100 s"
 _MAX_STATION_ID: Final = 4
+
+
+@parameters
+class ServiceDParams:
+    """GAST-D: what its protection levels and monitors are set to.
+
+    Sources: RTCA DO-253D by way of published descriptions; time constant and limit of the divergence are those of
+    Jiang, Milner, Macabiau, ENC 2015. Known are 2 m, 200 m and the time-outs; uncertain are K_fd_B, the limits of
+    projections (ceilings recommended to aircraft), the gate, and all times of holding and clearing, which are ours.
+    """
+
+    protection_probability: Annotated[
+        float, Parameter("probability the protection level multipliers of GAST-D are made from", "-", 1e-15, 1e-3)
+    ] = 1.25e-10
+    weights: Annotated[
+        Literal["30 s", "100 s"],
+        Parameter("sigmas the positions are weighted with: those of the 30 s corrections, or those of the levels"),
+    ] = "30 s"
+    low_timeout_s: Annotated[
+        float, Parameter("guidance is lost without messages for this long below 200 ft", "s", 0.0, 3.5)
+    ] = 1.5
+    require_authentication: Annotated[
+        bool, Parameter("no GAST-D without authentication of the station's slots (see authentication)")
+    ] = True
+    divergence_mps: Annotated[
+        float, Parameter("a satellite whose code and carrier drift apart faster is not used", "m/s", 0.0, 1.0)
+    ] = AIRBORNE_THRESHOLD_MPS
+    divergence_tau_s: Annotated[float, Parameter("time constant of both filters of that rate", "s", 1.0, 1000.0)] = (
+        AIRBORNE.tau_s
+    )
+    divergence_settle_s: Annotated[
+        float, Parameter("time these filters have to run before a satellite is used", "s", 0.0, 3600.0)
+    ] = AIRBORNE.settle_s
+    divergence_clear_s: Annotated[
+        float, Parameter("an excluded satellite is used again when the rate was small for this long", "s", 0.0, 3600.0)
+    ] = 100.0
+    dual_solution_m: Annotated[
+        float, Parameter("largest difference of 30 s and 100 s solutions, vertically and laterally", "m", 0.0, 100.0)
+    ] = 2.0
+    k_fd_b: Annotated[
+        float, Parameter("threshold of the B values in the position over their sigma (RRFM)", "-", 1.0, 20.0)
+    ] = 5.26
+    exclusions: Annotated[int, Parameter("satellites that may be left out so that both of these pass", "-", 0, 3)] = 1
+    exclusion_hold_s: Annotated[
+        float, Parameter("a satellite left out is not tried again for this long", "s", 0.0, 3600.0)
+    ] = 60.0
+    correction_shift_m: Annotated[
+        float, Parameter("most that the 100 s corrections may move the position horizontally", "m", 0.0, 10000.0)
+    ] = 200.0
+    s_vert: Annotated[
+        float, Parameter("largest vertical projection of a satellite that the aircraft allows", "-", 0.1, 100.0)
+    ] = 4.0
+    s_vert_pair: Annotated[float, Parameter("largest sum of those of two satellites", "-", 0.1, 100.0)] = 6.0
+    s_lat: Annotated[
+        float, Parameter("largest lateral projection of a satellite that the aircraft allows", "-", 0.1, 100.0)
+    ] = 4.0
+    s_lat_pair: Annotated[float, Parameter("largest sum of those of two satellites", "-", 0.1, 100.0)] = 6.0
+    step_in_s: Annotated[
+        float, Parameter("a satellite is used when it has been usable for this long", "s", 0.0, 3600.0)
+    ] = 50.0
+    upgrade_gate_m: Annotated[
+        float,
+        Parameter("nearer to the threshold no better service is taken up again", "m", 0.0, 100000.0),
+    ] = 7500.0
 
 
 @parameters
 class AirborneParams:
     """Choices of the airborne receiver."""
 
-    service: Annotated[Literal["C"], Parameter("approach service type asked for")] = "C"
+    service: Annotated[
+        Literal["C", "D", "L5-100", "L5-30", "IF-100", "IF-30"],
+        Parameter("approach service type asked for: C, D, or one of two bands that no standard has yet"),
+    ] = "C"
+    fallback: Annotated[
+        bool,
+        Parameter(
+            "where the service asked for cannot be given, the next one guides: D or L5, then C; IF, then L5, then C"
+        ),
+    ] = True
+    modes: Annotated[
+        tuple[str, ...],
+        Parameter(
+            "processing modes that run beside it for /gbas/airborne/modes, by their names in docs/contract.md; "
+            "'all' is every mode of the systems used"
+        ),
+    ] = ()
     aad: Annotated[Literal["A", "B"], Parameter("airborne accuracy designator")] = "A"
     systems: Annotated[
         Literal["G", "E", "GE", "EG"],
@@ -59,15 +143,19 @@ class AirborneParams:
     ] = math.radians(5.0)
     smoothing_tau_s: Annotated[
         float,
-        Parameter("time constant of the carrier smoothing: 100 for GAST-C, 0 for none (comparisons)", "s", 0.0, 1000.0),
-    ] = 100.0
+        Parameter(
+            "time constant of the carrier smoothing of GAST-C where that guides: 100, or 0 for none (comparisons); the "
+            "other modes have their own",
+            "s", 0.0, 1000.0,
+        ),
+    ] = 100.0  # fmt: skip
     settle_s: Annotated[
         float,
         Parameter("a satellite is used once its filter has run for this (docs/decisions/0002)", "s", 0.0, 3600.0),
     ] = 230.0
     inflate_unsettled: Annotated[
         bool,
-        Parameter("scale airborne noise and multipath while the filter settles, and for a time constant below 100 s"),
+        Parameter("scale airborne noise and multipath while the filter settles, and for no smoothing"),
     ] = True
     max_gap_s: Annotated[
         float,
@@ -164,11 +252,16 @@ class AirborneParams:
     ] = 1e-5
     k_ffmd_single: Annotated[float, Parameter("K_ffmd with one reference receiver", "-", 1.0, 20.0)] = 6.86
 
+    gast_d: ServiceDParams = ServiceDParams()
+
     def __post_init__(self) -> None:
         if not _distinct(self.slot_group, SLOT_NAMES):
             raise ParameterError(f"slot_group = {self.slot_group!r} is not of distinct letters A to H")
         if self.slot_group and not self.authentication:
             raise ParameterError(f"slot_group = {self.slot_group!r} is given without authentication")
+        known = {mode.name for mode in modes.MODES} | {ALL_MODES}
+        if unknown := [name for name in self.modes if name not in known]:
+            raise ParameterError(f"modes = {unknown[0]!r} is not one of {', '.join(sorted(known))}")
         if len(self.station_id) > _MAX_STATION_ID:
             raise ParameterError(f"station_id = {self.station_id!r} has more than {_MAX_STATION_ID} characters")
 

@@ -229,7 +229,7 @@ class Contents:
             namespace, name = split(topic)
             if name in _GROUND_OUTPUTS:
                 self._complete(topic, series, observed, "was observed")
-            elif name in (topics.AIRBORNE_SOLUTION, topics.AIRBORNE_PROTECTION):
+            elif name in (topics.AIRBORNE_SOLUTION, topics.AIRBORNE_PROTECTION, topics.AIRBORNE_MODES):
                 source = self._series.get(f"{namespace}/{topics.AIRBORNE_OBSERVATIONS}")
                 self._complete(topic, series, sorted(source.keys) if source else [], "was observed")
             elif topic in self._frames:

@@ -20,6 +20,7 @@ from gbas_msgs_py import topics
 NAMES: Final[dict[str, str]] = {
     topics.AIRBORNE_PROTECTION: "protection levels",
     topics.AIRBORNE_SOLUTION: "solutions",
+    topics.AIRBORNE_MODES: "mode epochs",
     topics.VDB: "VDB bursts",
     topics.GROUND_INTEGRITY: "integrity epochs",
     topics.GROUND_MONITORS: "monitor epochs",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import statistics
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Final, TypeVar
 
 import yaml
@@ -23,10 +23,11 @@ from gbas_core.gnss.gpstime import from_epoch_key
 from gbas_core.io.recording import RecordedEpoch
 from gbas_ground.broadcast import BroadcastState
 from gbas_ground.params import GroundParams
-from gbas_ground.sections import SmoothingSection
+from gbas_ground.sections import SECOND_PRODUCTS, SmoothingSection
 from gbas_ground.station import GroundEpoch, GroundStation, StationReport
 from gbas_msgs_py import tables
 from gbas_msgs_py.records import ProtectionEpoch, SolutionEpoch
+from gbas_vdb.transmission.burst import SLOT_NAMES
 from gbas_vdb.transmission.receive import decode_burst
 
 INTERVAL_S: Final = 0.5
@@ -150,6 +151,8 @@ def _step_through(flight: Flight, clock: _Clock) -> None:
     """The steps one by one, as the nodes take them."""
     station = GroundStation(flight.ground)
     monitor, broadcast = station.initial_integrity(), BroadcastState()
+    both_bands = GroundStation(_with_second_band(flight.ground))
+    of_both = both_bands.initial_integrity(), BroadcastState()
     position, service = PositionState(), ServiceState()
     ephemerides: tuple[Ephemeris, ...] = (flight.ephemeris,)
     for epoch in flight.epochs:
@@ -157,16 +160,24 @@ def _step_through(flight: Flight, clock: _Clock) -> None:
         seen = GroundEpoch(gps_week=week, tow_s=tow_s, observations=epoch.ground, ephemerides=ephemerides)
         monitor, monitored = clock.time("monitor", station.monitor, monitor, seen)
         broadcast, bursts = clock.time("broadcast", station.broadcast, broadcast, monitored.integrity)
+        integrity, made = clock.time("monitor, two bands", both_bands.monitor, of_both[0], seen)
+        sent, _ = clock.time("broadcast, two bands", both_bands.broadcast, of_both[1], made.integrity)
+        of_both = integrity, sent
         heard = AirborneEpoch(
             gps_week=week, tow_s=tow_s, observations=epoch.user, bursts=bursts, ephemerides=ephemerides
         )
-        position, (solution, *_), _ = clock.time(
-            "position", AirborneReceiver.position, position, heard, flight.airborne
-        )
+        position, selected = clock.time("position", AirborneReceiver.position, position, heard, flight.airborne)
+        solution = selected.solutions[0]
         service, protection, _ = clock.time("protect", AirborneReceiver.protect, service, solution, flight.airborne)
         clock.time("vdb decode", lambda bursts=bursts: [decode_burst(burst) for burst in bursts])
         _convert(clock, epoch, monitored, solution, protection)
         ephemerides = ()
+
+
+def _with_second_band(params: GroundParams) -> GroundParams:
+    """The same station with all corrections of L5/E5a, and the slots for them."""
+    second = replace(params.second_band, products=SECOND_PRODUCTS)
+    return replace(params, second_band=second, vdb=replace(params.vdb, slots="".join(SLOT_NAMES)))
 
 
 def _convert(
@@ -182,7 +193,7 @@ def _convert(
     records += [(tables.MONITORS, monitored.statistics), (tables.MONITOR_DETAILS, monitored.details)]
     records += [(tables.SOLUTION, solution), (tables.PROTECTION, protection)]
     encoded = clock.time("table encode", lambda: [(schema, schema.encode(record)) for schema, record in records])
-    clock.time("table decode", lambda: [schema.decode(schema.label, table) for schema, table in encoded])
+    clock.time("table decode", lambda: [schema.decode(schema.label_of(table), table) for schema, table in encoded])
 
 
 def _step_figures(clock: _Clock) -> Iterator[Figure]:
@@ -190,6 +201,7 @@ def _step_figures(clock: _Clock) -> Iterator[Figure]:
         ("ground step: monitor", ("monitor",), GROUND_BUDGET_S),
         ("ground step: broadcast, with VDB encode", ("broadcast",), GROUND_BUDGET_S),
         ("ground step, both", ("monitor", "broadcast"), GROUND_BUDGET_S),
+        ("ground step, both, with L5/E5a", ("monitor, two bands", "broadcast, two bands"), GROUND_BUDGET_S),
         ("airborne step: position, with VDB decode", ("position",), AIRBORNE_BUDGET_S),
         ("airborne step: protect", ("protect",), AIRBORNE_BUDGET_S),
         ("airborne step, both", ("position", "protect"), AIRBORNE_BUDGET_S),

@@ -72,16 +72,17 @@ def aircraft(flight: Flight, sent: list[tuple[Burst, ...]]) -> int:
             gps_week=week, tow_s=tow_s, observations=epoch.user, bursts=bursts,
             ephemerides=() if number else (flight.ephemeris,),
         )  # fmt: skip
-        position, (solution, *_), _ = AirborneReceiver.position(position, heard, flight.airborne)
-        service, protection, _ = AirborneReceiver.protect(service, solution, flight.airborne)
-        _there_and_back(tables.SOLUTION, solution)
+        position, selected = AirborneReceiver.position(position, heard, flight.airborne)
+        service, protection, _ = AirborneReceiver.protect(service, selected.solutions[0], flight.airborne)
+        _there_and_back(tables.SOLUTION, selected.solutions[0])
         _there_and_back(tables.PROTECTION, protection)
         protected += protection.vpl_m < float("inf")
     return protected
 
 
 def _there_and_back(schema: Any, record: Record | None) -> None:
-    schema.decode(schema.label, schema.encode(record))
+    table = schema.encode(record)
+    schema.decode(schema.label_of(table), table)
 
 
 def _process(part: str, given: Any, **environment: str) -> subprocess.Popen[bytes]:

@@ -20,7 +20,7 @@ from gbas_ground.params import GroundParams
 from gbas_ground.station import GroundEpoch, GroundStation, StationReport, StationState
 from gbas_msgs_py.events import Event
 from gbas_msgs_py.joining import AirborneInput, AirborneJoiner, ReceptionQueue
-from gbas_msgs_py.records import IntegrityEpoch, ProtectionEpoch, SolutionEpoch
+from gbas_msgs_py.records import IntegrityEpoch, ModesEpoch, ProtectionEpoch, SolutionEpoch
 from gbas_vdb.transmission.burst import Burst
 
 Channel = Callable[[int, tuple[Burst, ...]], Iterable[Burst]]
@@ -56,12 +56,15 @@ class AirborneOutput:
     events : tuple of Event
     others : tuple of (SolutionEpoch, ProtectionEpoch)
         Of the modes beside it.
+    modes : ModesEpoch or None
+        All modes beside one another; None where there is one.
     """
 
     solution: SolutionEpoch
     protection: ProtectionEpoch
     events: tuple[Event, ...]
     others: tuple[tuple[SolutionEpoch, ProtectionEpoch], ...] = ()
+    modes: ModesEpoch | None = None
 
 
 class Chain:
@@ -142,7 +145,13 @@ class Chain:
             self._airborne_params,
         )
         first, *others = zip(output.solutions, output.protections, strict=True)
-        return AirborneOutput(solution=first[0], protection=first[1], events=output.events, others=tuple(others))
+        return AirborneOutput(
+            solution=first[0],
+            protection=first[1],
+            events=output.events,
+            others=tuple(others),
+            modes=output.modes,
+        )
 
 
 def _queue(ephemerides: Iterable[Ephemeris]) -> ReceptionQueue[Ephemeris]:

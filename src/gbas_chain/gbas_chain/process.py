@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 import yaml
 
-from gbas_airborne.params import AirborneParams, airborne_section
+from gbas_airborne.modes import configured_modes
+from gbas_airborne.params import ALL_MODES, AirborneParams, airborne_section
 from gbas_bringup.resources import config_path
 from gbas_chain.chain import AirborneOutput, Chain
+from gbas_chain.mode_results import mode_summary, write_modes_csv
 from gbas_chain.results import Row, summarise, write_json, write_solution_csv
 from gbas_core.configuration import read_configuration
 from gbas_core.errors import ConfigError, GbasError
@@ -22,13 +24,18 @@ from gbas_core.io.rinex import NavigationFile, ObservationFile
 from gbas_core.positioning.approach_keys import RECORD_KEY
 from gbas_ground.claims.broadcast_claims import statements
 from gbas_ground.params import SECTION, GroundParams
-from gbas_msgs_py.codes import EventKind
+from gbas_msgs_py.codes import EventKind, Signal
 from gbas_msgs_py.events import Event
+from gbas_msgs_py.products import PRODUCT_INDEX, PRODUCTS
+from gbas_msgs_py.records import ModesEpoch
 from gbas_vdb.messages.path_point import path_points_of
+from gbas_vdb.transmission.burst import SLOT_NAMES
 
 NOMINAL_STATION = "nominal_station.yaml"
 """Station values assumed for recorded data when no station file is given; a file a person can read and copy."""
 
+ALL_SERVICES = "all"
+"""Instead of a service: every processing mode, with guidance of GAST-C."""
 Progress = Callable[[int, int], None]
 
 
@@ -49,9 +56,9 @@ class ProcessRequest:
     gps_week : int or None
         GPS week of the first epoch of RTCM 3 streams; None where they have ephemerides that say it.
     service : str
-        Service type, ``"C"``.
+        Service type that guides, ``"C"`` to ``"IF-30"``, or ``"all"``: C, with every mode beside it.
     systems : str
-        Satellite systems, ``"G"``, ``"E"`` or ``"GE"``.
+        Satellite systems, ``"G"``, ``"E"`` or ``"GE"``; with ``"all"`` and ``"GE"`` each alone, too.
     station, fas, airborne : Path or None
         Configuration files: station (section ``ground``), final approach, airborne receiver (section ``airborne``).
     """
@@ -100,10 +107,16 @@ class ProcessResult:
     run_file: dict[str, Any]
     simulated: bool = False
 
+    def modes(self) -> tuple[ModesEpoch, ...]:
+        """All modes of every epoch; empty where there is one mode."""
+        return tuple(output.modes for output in self.outputs if output.modes is not None)
+
     def summary(self) -> dict[str, Any]:
         """Body of ``summary.json``."""
+        modes = {"modes": mode_summary(self.modes(), self.airborne.systems)} if self.modes() else {}
         return {
             **summarise(self.rows),
+            **modes,
             "events": _event_counts(self.events),
             "notes": list(self.notes),
             "station": {"id": self.ground.station.id, "designator": self.ground.accuracy.designator},
@@ -145,6 +158,7 @@ def prepare(request: ProcessRequest) -> Prepared:
             f"--ground-xyz: {len(request.ground_xyz_m)} positions for {len(request.ground)} ground files; "
             "expected one each"
         )
+    _wanted(request)
     recording = Recording.open(
         request.ground,
         request.user,
@@ -200,11 +214,13 @@ def _files(recording: Recording) -> tuple[ObservationFile | NavigationFile, ...]
 def write_results(result: ProcessResult, out: Path) -> dict[str, Any]:
     """Write the results into a folder; returns the summary.
 
-    ``solution.csv``, ``summary.json``, ``events.jsonl``, and ``run.yaml``: the same files through live nodes with
-    ``gbas run run.yaml``.
+    ``solution.csv``, ``modes.csv`` where several modes run, ``summary.json``, ``events.jsonl``, and ``run.yaml``: the
+    same files through live nodes with ``gbas run run.yaml``.
     """
     out.mkdir(parents=True, exist_ok=True)
     write_solution_csv(out / "solution.csv", result.rows)
+    if result.modes():
+        write_modes_csv(out / "modes.csv", result.modes(), result.airborne.systems)
     (out / "events.jsonl").write_text("".join(event.to_json() + "\n" for event in result.events), encoding="utf-8")
     summary = result.summary()
     write_json(out / "summary.json", summary)
@@ -291,9 +307,33 @@ def _ground_sections(
     if without and "require_cn0" not in power:
         power["require_cn0"] = False
         notes.append(f"{', '.join(without)}: no C/N0 in the file, so signal power is not monitored")
+    _make_corrections(request, sections)
     if request.fas is not None:
         sections["approaches"] = {"fas": dict(_fas(request.fas))}
     return str(path), sections
+
+
+def _service_values(service: str) -> dict[str, Any]:
+    """Values of the receiver for the service asked for."""
+    return {"service": "C", "modes": [ALL_MODES]} if service == ALL_SERVICES else {"service": service}
+
+
+def _wanted(request: ProcessRequest) -> AirborneParams:
+    """A receiver of the service asked for, before anything is read."""
+    return AirborneParams.from_mapping(_service_values(request.service), source="--service")
+
+
+def _make_corrections(request: ProcessRequest, sections: dict[str, dict[str, Any]]) -> None:
+    """Let the station make and send what the modes need, where its file does not say; it may use every slot then."""
+    products = {name for mode in configured_modes(_wanted(request)) for name in mode.products}
+    second = sorted(name for name in products if PRODUCTS[PRODUCT_INDEX[name]].signal is Signal.L5)
+    if "l1_30" in products:
+        # a station that is taken for one claims nothing, so it need not have the monitors behind the claims
+        sections["gast_d"] = {"enabled": True, "required": request.station is not None} | sections.get("gast_d", {})
+    if second:
+        sections.setdefault("second_band", {}).setdefault("products", second)
+    if request.station is None and products != {"l1_100"}:
+        sections.setdefault("vdb", {})["slots"] = "".join(SLOT_NAMES)
 
 
 def _header_positions(recording: Recording, notes: list[str]) -> tuple[tuple[float, float, float], ...]:
@@ -330,12 +370,14 @@ def _airborne_values(request: ProcessRequest, recording: Recording, ground: Grou
     assert recording.user is not None
     interval_s = max(file.interval_s or 0.0 for file in recording.ground)
     values: dict[str, Any] = {
-        "service": request.service,
+        **_service_values(request.service),
         "systems": request.systems,
         "max_gap_s": max(3.5, 1.5 * (recording.user.interval_s or 0.0)),
         "station_data_timeout_s": min(max(60.0, 30.0 * interval_s), 3600.0),  # they come round in 20 epochs
         "use_unhealthy": True,  # without a service; a station that claims one is not affected
     }
+    if request.station is None:
+        values["gast_d"] = {"require_authentication": False}  # of a station that claims nothing
     if ground.approaches:
         values["rpds"] = ground.approaches[0].rpds
     return {**values, **given}

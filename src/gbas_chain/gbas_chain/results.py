@@ -86,7 +86,7 @@ class Row:
             tow_s=solution.tow_s,
             position_m=position if protected else None,
             n_sats=int(solution.n_sats) if protected else 0,
-            service="none" if service is ServiceType.NONE else service.name,
+            service="none" if service is ServiceType.NONE else service.option,
             vpl_m=protection.vpl_m,
             lpl_m=protection.lpl_m,
             val_m=protection.val_m,

@@ -274,7 +274,13 @@ def process(
     gps_week: Annotated[
         int | None, typer.Option(metavar="WEEK", help="GPS week in which RTCM 3 streams without ephemerides begin.")
     ] = None,
-    service: Annotated[str, typer.Option(metavar="C", help="Approach service type.")] = "C",
+    service: Annotated[
+        str,
+        typer.Option(
+            metavar="C|D|L5-30|L5-100|IF-30|IF-100|all",
+            help="Approach service type, or all processing modes beside one another (modes.csv).",
+        ),
+    ] = "C",
     systems: Annotated[str, typer.Option(metavar="G|E|GE", help="GPS, Galileo, or both.")] = "G",
     fas: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Final approach, YAML or an ARINC 424 path point record.")
@@ -287,6 +293,7 @@ def process(
     """Put recorded RINEX or RTCM 3 through the whole chain, offline; write solution.csv and summary.json."""
     from gbas_bringup.progress import progress
     from gbas_chain import process as body
+    from gbas_chain.mode_results import mode_lines
 
     request = body.ProcessRequest(
         ground=tuple(ground),
@@ -311,7 +318,10 @@ def process(
     for note in result.notes:
         print(f"note: {note}", file=sys.stderr)
     _print_summary(summary)
-    print_places({"table": folder / "solution.csv", "summary": folder / "summary.json"})
+    for line in mode_lines(summary.get("modes", {})):
+        print(line)
+    places = {"table": folder / "solution.csv", "summary": folder / "summary.json"}
+    print_places(places | ({"modes": folder / "modes.csv"} if "modes" in summary else {}))
 
 
 @app.command()

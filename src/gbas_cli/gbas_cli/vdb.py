@@ -8,12 +8,13 @@ from typing import Annotated
 
 import typer
 
-from gbas_cli import vdb_fas
+from gbas_cli import vdb_budget, vdb_fas
 from gbas_cli.base import Json, print_json
 from gbas_core.errors import ConfigError
 
 app = typer.Typer(help="Messages of the VHF data broadcast: bits to values and back.", no_args_is_help=True)
 vdb_fas.register(app)
+vdb_budget.register(app)
 
 
 @app.command()

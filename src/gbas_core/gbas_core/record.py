@@ -42,6 +42,8 @@ class ColumnSpec:
         Whether it is part of what a row is about: no two rows have the same.
     codes : tuple of int or None
         Numbers it may have; None for a quantity.
+    optional : tuple of str
+        Those of `names` that a table has only where one of them has a value.
     """
 
     names: tuple[str, ...]
@@ -52,6 +54,7 @@ class ColumnSpec:
     leading: tuple[int, ...] = ()
     key: bool = False
     codes: tuple[int, ...] | None = None
+    optional: tuple[str, ...] = ()
 
 
 def scalar(unit: str, doc: str) -> Any:
@@ -59,17 +62,25 @@ def scalar(unit: str, doc: str) -> Any:
     return field(default=float("nan"), metadata={_KEY: ColumnSpec((), unit, doc)})
 
 
-def per_satellite(unit: str, doc: str, *, columns: tuple[str, ...] = (), leading: tuple[int, ...] = ()) -> Any:
+def per_satellite(
+    unit: str,
+    doc: str,
+    *,
+    columns: tuple[str, ...] = (),
+    leading: tuple[int, ...] = (),
+    optional: tuple[str, ...] = (),
+) -> Any:
     """Declare a field on the satellite axis; its default is all NaN (missing).
 
     With `columns` the array has shape ``(len(columns), N_SATS)`` and each name is one column of the table; with
     `leading` too its shape is ``(*leading, N_SATS)`` and the names are in that order, the last axis first to change.
-    Without, the array has shape ``(N_SATS,)`` and the column has the field's own name.
+    Without, the array has shape ``(N_SATS,)`` and the column has the field's own name. Tables without any value in the
+    `optional` ones of the columns do not have these.
     """
     axes = leading or ((len(columns),) if columns else ())
     if columns and math.prod(axes) != len(columns):
         raise ValueError(f"{len(columns)} columns for axes of {axes}")
-    spec = ColumnSpec(columns, unit, doc, satellite=True, leading=axes)
+    spec = ColumnSpec(columns, unit, doc, satellite=True, leading=axes, optional=optional)
     return field(default_factory=lambda: missing(*axes), metadata={_KEY: spec})
 
 

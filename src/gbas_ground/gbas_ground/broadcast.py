@@ -1,7 +1,9 @@
 """From integrity to the air: one epoch's corrections as the bursts of one frame.
 
 Nothing is broadcast that the integrity epoch does not call usable and complete. A station without corrections stays on
-the air with an empty type 1 message and says that it is not healthy.
+the air with an empty type 1 message and says that it is not healthy. Types 1 and 11 come first; corrections of a second
+band have what these leave. What does not fit is left out from the lowest satellite up, and the station says so
+(:func:`fitting`).
 """
 
 from __future__ import annotations
@@ -10,7 +12,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -30,7 +32,7 @@ from gbas_msgs_py.codes import ChannelState
 from gbas_msgs_py.products import PRODUCTS
 from gbas_msgs_py.records import MAX_REFERENCE_RECEIVERS, IntegrityEpoch
 from gbas_vdb.messages.fixed_places import Items
-from gbas_vdb.messages.tables import CORRECTION_ENTRIES
+from gbas_vdb.messages.tables import CORRECTION_ENTRIES, PRIVATE_ENTRIES
 from gbas_vdb.messages.types import Type2
 from gbas_vdb.transmission.burst import FRAME_DURATION_S, Burst
 from gbas_vdb.transmission.frame import Frame, ScheduleState, Sources
@@ -106,7 +108,7 @@ def _carried(
         for t in range(n_made):
             ok = ok and 0.0 <= decorrelation[t, i] <= MAX_DECORRELATION and 0.0 < sigma_m[t, i] <= MAX_SIGMA_M
             ok = ok and abs(prc_m[t, i]) <= max_prc_m and abs(rrc_mps[t, i]) <= max_rrc_mps
-        for t in range(len(b_m)):
+        for t in range(n_made):
             for m in range(b_m.shape[1]):
                 ok = ok and not (has_b_values[t] and abs(b_m[t, m, i]) > MAX_B_VALUE_M)
         result[i] = ok
@@ -119,14 +121,63 @@ def _is_count(value: float, largest: float) -> bool:
     return 0.0 <= value <= largest and value == math.floor(value)
 
 
+def second_broadcastable(integrity: IntegrityEpoch, usable: BoolArray, station: PreparedStation) -> BoolArray:
+    """Those of the satellites whose corrections of the second band are whole and within what the messages carry."""
+    second, limits = station.second, station.params.correction_limits
+    if second is None:
+        return np.zeros_like(usable)
+    places = second.products
+    sigma_m, b_m = integrity.sigma_pr_gnd_m[places], integrity.b_m[places]
+    fits = (sigma_m > 0.0) & (sigma_m <= MAX_SIGMA_M)
+    fits &= np.abs(integrity.prc_m[places]) <= limits.max_prc_m
+    fits &= np.abs(integrity.rrc_mps[places]) <= limits.max_rrc_mps
+    fits &= ~(np.abs(b_m) > MAX_B_VALUE_M).any(axis=1)
+    return usable & fits.all(axis=0)
+
+
+class Fitting(NamedTuple):
+    """What of the corrections is sent.
+
+    Attributes
+    ----------
+    satellites, second : tuple of int
+        Places of the satellites that are sent, and of those with corrections of the second band.
+    room, second_room : int
+        How many would fit; -1 for the second band where not even a message without satellites does.
+    left_out, second_left_out : int
+        Satellites that there is no room for.
+    """
+
+    satellites: tuple[int, ...]
+    second: tuple[int, ...]
+    room: int
+    second_room: int
+    left_out: int
+    second_left_out: int
+
+
+def fitting(integrity: IntegrityEpoch, station: PreparedStation) -> Fitting:
+    """The satellites that are sent, the highest where there is not room for all."""
+    usable, settings = broadcastable(integrity, station.params), station.frames
+    satellites = _highest(usable, integrity.elevation_rad, settings.room)
+    left_out = int(np.count_nonzero(usable)) - len(satellites)
+    if station.second is None:
+        return Fitting(satellites, (), settings.room, 0, left_out, 0)
+    sent = np.zeros_like(usable)
+    sent[list(satellites)] = True
+    of_second = second_broadcastable(integrity, sent, station)
+    room = settings.second_rooms[len(satellites)]
+    second = _highest(of_second, integrity.elevation_rad, max(room, 0))
+    return Fitting(satellites, second, settings.room, room, left_out, int(np.count_nonzero(of_second)) - len(second))
+
+
 def broadcast_frame(
     state: BroadcastState, integrity: IntegrityEpoch, station: PreparedStation
 ) -> tuple[BroadcastState, tuple[Burst, ...]]:
     """Bursts of the frame that begins at the integrity's epoch.
 
     An epoch that is not later than the last frame, or is not at the start of a frame, gives no bursts; time that goes
-    on from an earlier epoch is believed in the end. When more satellites are usable than the slots hold, the lowest are
-    left out.
+    on from an earlier epoch is believed in the end.
     """
     key = epoch_key(integrity.gps_week, integrity.tow_s)
     if key % _FRAME_MS:
@@ -135,11 +186,11 @@ def broadcast_frame(
     if arrival is Arrival.REFUSED:
         return replace(state, order=order), ()
     params, settings = station.params, station.frames
-    usable = broadcastable(integrity, params)
+    chosen = fitting(integrity, station)
     sigma_vig = integrity.sigma_vert_iono_gradient
     enough = params.receivers.minimum <= integrity.n_receivers <= MAX_REFERENCE_RECEIVERS
     serves = bool(enough and 0.0 <= sigma_vig <= MAX_SIGMA_VIG)
-    satellites = _highest(usable, integrity.elevation_rad, settings.room) if serves else ()
+    satellites = chosen.satellites if serves else ()
     serves = len(satellites) >= MIN_SERVICE_SATELLITES
     # a station that does not serve says so, and claims the least it can of the ionosphere
     gcid, sigma_vig = (params.station.gcid, sigma_vig) if serves else (GCID_UNHEALTHY, MAX_SIGMA_VIG)
@@ -148,6 +199,7 @@ def broadcast_frame(
         tow_s=integrity.tow_s,
         sources=_sources(integrity, satellites, settings.schedule.message_types),
         station=_station_data(settings.station, gcid, sigma_vig),
+        further=_further(integrity, chosen, station) if satellites else {},
         approaches=settings.approaches,
     )
     scheduled, bursts = schedule_frame(state.schedule, frame, settings.schedule)
@@ -192,8 +244,19 @@ def _sources(integrity: IntegrityEpoch, satellites: tuple[int, ...], types: tupl
     )
 
 
+def _further(integrity: IntegrityEpoch, chosen: Fitting, station: PreparedStation) -> dict[int, Items]:
+    """Corrections of the second band by the measurement type of their messages; none where no message fits."""
+    if station.second is None or chosen.second_room < 0:
+        return {}
+    rows, found = np.array(chosen.second, dtype=np.int64), {}
+    for place in station.second.products.tolist():
+        kind = PRODUCTS[place].measurement_type
+        found[kind] = Items(PRIVATE_ENTRIES[kind], _columns_1(integrity, place)[:, rows].T.copy())
+    return found
+
+
 def _columns_1(integrity: IntegrityEpoch, product: int) -> FloatArray:
-    """Fields of the measurement blocks of a type 1 message, ``(F, N)``."""
+    """Fields of the measurement blocks of a type 1 message, and of ours, ``(F, N)``."""
     return np.vstack([
         _SOURCE_ID, integrity.iod % _IOD_MODULUS, integrity.prc_m[product], integrity.rrc_mps[product],
         integrity.sigma_pr_gnd_m[product], integrity.b_m[product],

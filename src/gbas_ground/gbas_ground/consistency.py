@@ -15,7 +15,6 @@ import numpy as np
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import CLOCK_GROUPS, N_SATS, SAT_IDS
 from gbas_ground.corrections.kernels import consistency as kernels
-from gbas_ground.corrections.sigma import measured_sigma_m
 from gbas_ground.exclusions import Latch, exclude, initial_latch
 from gbas_ground.monitors.monitor_table import MonitorSummary, Summaries
 from gbas_ground.params import GroundParams
@@ -46,6 +45,8 @@ class CorrectionInputs:
     judged : (N,) bool array
         Satellites that every required monitor of signals could judge.
     elevation_rad : (N,) array
+    sigma_m : (k, N) array
+        What the sigmas are made of (:func:`~gbas_ground.corrections.kernels.consistency.broadcast_sigmas_m`) [m].
     """
 
     correction_m: FloatArray
@@ -54,6 +55,7 @@ class CorrectionInputs:
     settled: BoolArray
     judged: BoolArray
     elevation_rad: FloatArray
+    sigma_m: FloatArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -139,10 +141,10 @@ class Checks(NamedTuple):
     due: BoolArray
     n_failed: int
 
-    def summaries(self) -> Summaries:
+    def summaries(self, signal: Signal = Signal.L1) -> Summaries:
         """What they say of each satellite."""
         rows = zip(_TESTS, self.statistic, self.threshold, self.failed, self.due, strict=True)
-        return {key: MonitorSummary(value, limit, failed, due, Signal.L1) for key, value, limit, failed, due in rows}
+        return {key: MonitorSummary(value, limit, failed, due, signal) for key, value, limit, failed, due in rows}
 
 
 def form_corrections(
@@ -153,7 +155,7 @@ def form_corrections(
     usable = kernels.usable_channels(given.settled, given.judged, exclusions.channels.cause, exclusions.receivers.cause)
     made = Corrections(*kernels.form_corrections(
         given.correction_m, given.previous_m, given.dt_s, usable, exclusions.satellites.cause, given.elevation_rad,
-        measured_sigma_m(station.params, given.elevation_rad), settings,
+        given.sigma_m, settings,
     ))  # fmt: skip
     checks = kernels.summarise_corrections(
         made.used, made.count, made.prc_m, made.rrc_mps, made.b_m, made.channel_sigma_m, settings
@@ -245,14 +247,30 @@ class ReadmissionState:
     satellites: BoolArray
 
 
+class SeenToPass(NamedTuple):
+    """What the monitors before this stage say, by which an exclusion may end.
+
+    Attributes
+    ----------
+    channels : (R, N) bool array
+        Channels that are tracked and pass the monitors of single channels.
+    receivers_quiet : (R,) array
+        1 where a receiver would do on its baselines, 0 where not, NaN where nobody can tell.
+    satellites : (N,) bool array
+        Satellites that the monitors of signals were seen to pass.
+    """
+
+    channels: BoolArray
+    receivers_quiet: FloatArray
+    satellites: BoolArray
+
+
 def readmission_state(
     correction_inputs: CorrectionInputs,
     corrections: Corrections,
     checks: Checks,
     exclusions: Exclusions,
-    channel_ok: BoolArray,
-    receivers_quiet: FloatArray,
-    satellite_ok: BoolArray,
+    seen: SeenToPass,
     station: PreparedStation,
 ) -> ReadmissionState:
     """Judge what is not used against the corrections it has no part in.
@@ -261,12 +279,7 @@ def readmission_state(
     ----------
     correction_inputs, corrections, checks, exclusions
         As they are after :func:`resolve_consistency`.
-    channel_ok : (R, N) bool array
-        Channels that are tracked and pass the monitors of single channels.
-    receivers_quiet : (R,) array
-        1 where a receiver would do on its baselines, 0 where not, NaN where nobody can tell.
-    satellite_ok : (N,) bool array
-        Satellites that the monitors of signals were seen to pass.
+    seen : SeenToPass
     station : PreparedStation
 
     Notes
@@ -283,6 +296,7 @@ def readmission_state(
     would ever end. Then everything is judged together as if nothing were excluded, and passes together or not at all.
     """
     settings = station.consistency
+    channel_ok, receivers_quiet, satellite_ok = seen
     residual_m = kernels.residual_m(
         correction_inputs.correction_m, correction_inputs.settled, corrections.common, corrections.prc_m, settings
     )

@@ -10,9 +10,11 @@ from gbas_core.parameters import ParameterError
 from gbas_ground.claims.gradient_claim import refuse_smaller as refuse_smaller_gradient
 from gbas_ground.claims.limits import MAX_M_EIG, MAX_Y_EIG_M
 from gbas_ground.claims.orbit_claim import refuse_smaller as refuse_smaller_decorrelation
+from gbas_ground.corrections.second_band import second_band_of
 from gbas_ground.monitors.false_alarm import FALSE_EXCLUSION
+from gbas_ground.sections import GCID_UNHEALTHY
 from gbas_vdb.errors import VdbError
-from gbas_vdb.transmission.schedule import sources_that_fit
+from gbas_vdb.transmission.schedule import further_sources_that_fit, sources_that_fit
 
 if TYPE_CHECKING:
     from gbas_ground.params import GroundParams
@@ -41,6 +43,7 @@ def check_station(params: GroundParams) -> None:
     """
     _check_receivers(params)
     _check_sigma_table(params)
+    second_band_of(params)
     _check_false_exclusions(params)
     _check_messages(params)
     _check_orbit_claim(params)
@@ -103,6 +106,16 @@ def _check_messages(params: GroundParams) -> None:
         raise ParameterError(f"cannot be broadcast: {error}") from None
     if room < MIN_SERVICE_SATELLITES:
         raise ParameterError(f"vdb.slots = {params.vdb.slots!r} leaves room for {room} satellites; 4 are needed")
+    kinds = params.private_kinds()
+    if not kinds:
+        return
+    given = params.station_message(), params.approach_messages(), params.schedule()
+    room = further_sources_that_fit(MIN_SERVICE_SATELLITES, kinds, *given)
+    if room < MIN_SERVICE_SATELLITES:
+        raise ParameterError(
+            f"vdb.slots = {params.vdb.slots!r} leaves room for {max(room, 0)} satellites of second_band.products = "
+            f"{', '.join(params.second_band.products)} beside 4 on L1; 4 are needed"
+        )
 
 
 def _check_orbit_claim(params: GroundParams) -> None:
@@ -131,6 +144,8 @@ def _check_gradient_claim(params: GroundParams) -> None:
     gast_d = params.gast_d
     if params.station.gcid in TYPE_D_GCID and not gast_d.enabled:
         raise ParameterError(f"station.gcid = {params.station.gcid} claims service type D, and gast_d.enabled is false")
+    if gast_d.enabled and not gast_d.required and params.station.gcid != GCID_UNHEALTHY:
+        raise ParameterError(f"gast_d.required = false with station.gcid = {params.station.gcid}, expected 7")
     if not gast_d.enabled or (gast_d.y_eig_m >= MAX_Y_EIG_M and gast_d.m_eig >= MAX_M_EIG):
         return
     try:

@@ -50,10 +50,12 @@ from gbas_ground.sections import (
     GastDSection,
     MonitorsSection,
     ReceiversSection,
+    SecondBandSection,
     SmoothingSection,
     StationSection,
     VdbSection,
 )
+from gbas_msgs_py.products import PRODUCTS
 from gbas_vdb.messages.block import encode_body
 from gbas_vdb.messages.path_point import trusted_path_point
 from gbas_vdb.messages.types import AdditionalBlock1, AdditionalBlock3, AdditionalBlock4, FasDataSet, Type2, Type4
@@ -119,6 +121,7 @@ class GroundParams:
     gast_d: GastDSection = GastDSection()
     vdb: VdbSection = VdbSection()
     smoothing: SmoothingSection = SmoothingSection()
+    second_band: SecondBandSection = SecondBandSection()
     ionosphere: IonosphereSection = IonosphereSection()
     approaches: Approaches = ()
 
@@ -258,6 +261,10 @@ class GroundParams:
             period_frames=self.vdb.period_frames,
             occupancy_min=self.vdb.occupancy_min,
         )
+
+    def private_kinds(self) -> tuple[int, ...]:
+        """Measurement types of the messages with corrections of a second band."""
+        return tuple(product.measurement_type for product in PRODUCTS if product.name in self.second_band.products)
 
     # --- files
 

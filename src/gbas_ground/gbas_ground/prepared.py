@@ -12,10 +12,11 @@ from gbas_core.ranging.channel_filter import ChannelFilterParams
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import satellites_of
 from gbas_ground.channels.predicted_ranges import Site, site_of
-from gbas_ground.channels.tracking import filter_params
+from gbas_ground.channels.tracking import SMOOTHED_BANDS, filter_params
 from gbas_ground.claims.limits import MAX_DECORRELATION
 from gbas_ground.claims.orbit_claim import OrbitSite, orbit_bound
 from gbas_ground.corrections.kernels.consistency import Settings
+from gbas_ground.corrections.second_band import BAND, SecondBandSettings, second_band_of
 from gbas_ground.corrections.sigma import settings_of
 from gbas_ground.ionosphere.places import Places, places_of
 from gbas_ground.monitors.carrier_acceleration import CarrierAccelerationParams
@@ -30,16 +31,21 @@ from gbas_ground.monitors.shared_receiver import Planes, planes_of
 from gbas_ground.params import GroundParams
 from gbas_vdb.messages.types import FasDataSet, Type2
 from gbas_vdb.transmission.frame import ScheduleParams
-from gbas_vdb.transmission.schedule import sources_that_fit
+from gbas_vdb.transmission.schedule import further_sources_that_fit, sources_that_fit
 
 
 class FrameSettings(NamedTuple):
-    """What every frame is made with: station data, approaches, schedule, and how many satellites fit."""
+    """What every frame is made with: station data, approaches, schedule, and how many satellites fit.
+
+    `second_rooms` says how many fit with a second band too, by how many are sent; -1 where not even a message without
+    any does. It is empty where there is no second band.
+    """
 
     station: Type2
     approaches: tuple[FasDataSet, ...]
     schedule: ScheduleParams
     room: int
+    second_rooms: tuple[int, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +72,12 @@ class PreparedStation:
     @cached_property
     def filters(self) -> ChannelFilterParams:
         """Settings of the channels' filters."""
-        return filter_params(self.params)
+        return filter_params(self.params, SMOOTHED_BANDS if self.second is None else (*SMOOTHED_BANDS, BAND))
+
+    @cached_property
+    def second(self) -> SecondBandSettings | None:
+        """What the second band is made with; None of a station that corrects one only."""
+        return second_band_of(self.params)
 
     @cached_property
     def consistency(self) -> Settings:
@@ -78,7 +89,9 @@ class PreparedStation:
         """What every frame is made with."""
         params = self.params
         given = params.station_message(), params.approach_messages(), params.schedule()
-        return FrameSettings(*given, room=sources_that_fit(*given))
+        room, kinds = sources_that_fit(*given), params.private_kinds()
+        second_rooms = [further_sources_that_fit(number, kinds, *given) for number in range(room + 1) if kinds]
+        return FrameSettings(*given, room=room, second_rooms=tuple(second_rooms))
 
     @cached_property
     def places(self) -> Places | None:
@@ -154,10 +167,10 @@ class PreparedStation:
     @property
     def gradient_required(self) -> bool:
         """Whether satellites must be monitored for gradients."""
-        return self.params.ionosphere_gradient.required or self.params.gast_d.enabled
+        return self.params.ionosphere_gradient.required or self.params.gast_d.demands_monitors
 
     @property
     def orbit_required(self) -> bool:
         """Whether orbits must be bounded by the station's own monitor."""
-        required = self.params.ephemeris_residual.required or self.params.gast_d.enabled
+        required = self.params.ephemeris_residual.required or self.params.gast_d.demands_monitors
         return required and not self.params.ephemeris.external_monitor

@@ -15,6 +15,7 @@ import numpy as np
 from gbas_core.parameters import Parameter, ParameterError, parameters
 from gbas_core.satellites import SYSTEM_MASKS
 from gbas_ground.claims.limits import MAX_DECORRELATION, MAX_M_EIG, MAX_Y_EIG_M
+from gbas_msgs_py.products import PRODUCTS
 from gbas_msgs_py.records import MAX_REFERENCE_RECEIVERS
 from gbas_vdb.transmission.burst import SLOT_NAMES
 
@@ -22,6 +23,8 @@ GCID_UNHEALTHY: Final = 7
 RSDS_NONE: Final = 255
 MAX_SIGMA_VIG: Final = 25.5e-6
 """Largest vertical ionosphere gradient sigma that a type 2 message carries [m/m]."""
+SECOND_PRODUCTS: Final = tuple(product.name for product in PRODUCTS if product.optional)
+"""Corrections that a station makes only where it is told to."""
 Place = tuple[float, float, float]
 
 
@@ -99,12 +102,32 @@ class AccuracySection:
     factor_30s: Annotated[float, Parameter("sigma of the 30 s corrections over the 100 s ones", "-", 1.0, 10.0)] = (
         math.sqrt(100.0 / 30.0)
     )
+    curves: Annotated[
+        str, Parameter("file with a table of curves for the second frequency; empty: that of the suite")
+    ] = ""
 
     def __post_init__(self) -> None:
         if len(self.sigma_elevation_rad) != len(self.sigma_m):
             raise ParameterError("sigma_elevation_deg and sigma_m are not lists of one length")
         if (np.diff(self.sigma_elevation_rad) <= 0.0).any():
             raise ParameterError("sigma_elevation_deg does not rise")
+
+
+@parameters
+class SecondBandSection:
+    """Corrections of a second frequency, L5 and E5a, in private messages; without products there are none.
+
+    A satellite has them only while it is usable on L1, by whose code and carrier it is found, placed and monitored.
+    """
+
+    products: Annotated[
+        tuple[str, ...], Parameter("corrections that are made and broadcast", choices=SECOND_PRODUCTS)
+    ] = ()
+    min_cn0_dbhz: Annotated[float, Parameter("lowest C/N0 of a channel in use", "dB-Hz", 0.0, 60.0)] = 30.0
+
+    def __post_init__(self) -> None:
+        if len(set(self.products)) != len(self.products):
+            raise ParameterError(f"products = {', '.join(self.products)}: one of them twice")
 
 
 @parameters
@@ -154,8 +177,20 @@ class GastDSection:
     """Service type D."""
 
     enabled: Annotated[bool, Parameter("broadcast type 11 messages and additional data block 3")] = False
+    required: Annotated[
+        bool,
+        Parameter(
+            "satellites that the gradient and the orbit monitor cannot judge are not used; false, for recorded data, "
+            "only where the station says that it is not healthy"
+        ),
+    ] = True
     y_eig_m: Annotated[float, Parameter("ionospheric error at the station", "m", 0.0, MAX_Y_EIG_M)] = MAX_Y_EIG_M
     m_eig: Annotated[float, Parameter("its growth with distance", "m/m", 0.0, MAX_M_EIG)] = MAX_M_EIG
+
+    @property
+    def demands_monitors(self) -> bool:
+        """Whether satellites without these monitors' judgement are not used."""
+        return self.enabled and self.required
 
 
 @parameters

@@ -1,6 +1,6 @@
 """The ground station: reference receivers' observations in, integrity and bursts out, one epoch at a time.
 
-    receive -> track -> monitor -> correct -> decide -> report -> broadcast
+    receive -> track -> monitor -> correct -> decide -> (second band) -> report -> broadcast
 
 The stages are in :mod:`gbas_ground.stages`; each has its own part of the state, takes one record and gives one.
 """
@@ -29,6 +29,7 @@ from gbas_ground.stages.monitor import MonitorState, initial_monitors, monitor_s
 from gbas_ground.stages.receive import SOURCE, GroundEpoch, ReceiveState, receive
 from gbas_ground.stages.report import ReportState, StationReport, refusal, report
 from gbas_ground.stages.satellite_status import SatelliteStatus
+from gbas_ground.stages.second_band import SecondBandState, initial_second_band, second_band
 from gbas_ground.stages.track import TrackState, track_channels
 from gbas_msgs_py.codes import ChannelState, EventKind
 from gbas_msgs_py.events import EventLog
@@ -54,6 +55,7 @@ class IntegrityState:
     monitor: MonitorState
     correct: CorrectState
     decide: DecideState
+    second: SecondBandState | None
     report: ReportState
 
 
@@ -99,6 +101,7 @@ class GroundStation:
             monitor=MonitorState(memories=initial_monitors(self._prepared), in_use=np.zeros(N_SATS, dtype=bool)),
             correct=CorrectState(previous=None, sigmas=initial_long_term(self.params)),
             decide=DecideState(ionosphere=initial_ionosphere()),
+            second=initial_second_band(self._prepared),
             report=ReportState(
                 status=nothing, contributing=np.zeros(count, dtype=bool), serving=False, channels=NO_CHANNELS
             ),
@@ -156,7 +159,10 @@ class GroundStation:
         monitoring, monitored = monitor_signals(state.monitor, tracked, station)
         correcting, corrected = correct(state.correct, monitored, station)
         deciding, decided = decide(state.decide, corrected, station)
-        reporting, made = report(state.report, decided, station)
+        second_state, second = state.second, None
+        if second_state is not None and station.second is not None:
+            second_state, second = second_band(second_state, decided, station, station.second)
+        reporting, made = report(state.report, decided, second, station)
         return IntegrityState(
             order=state.order,
             receive=replace(receiving, exclusions=corrected.exclusions),
@@ -164,5 +170,6 @@ class GroundStation:
             monitor=replace(monitoring, in_use=decided.status.usable),
             correct=correcting,
             decide=deciding,
+            second=second_state,
             report=reporting,
         ), made

@@ -92,7 +92,7 @@ class TableCodec(Generic[R]):
 
     def __init__(self, schema: TableSchema[R]) -> None:
         self.schema = schema
-        self._layout = _Layout((ROWS_LABEL, schema.label), alignment=8)
+        self._layouts = {label: _Layout((ROWS_LABEL, label), alignment=8) for label in schema.labels}
 
     def encode(self, record: R) -> bytes:
         """Message of a record; raises SchemaError as :meth:`TableSchema.encode` does."""
@@ -101,7 +101,9 @@ class TableCodec(Generic[R]):
     def message(self, table: FloatArray) -> bytes:
         """Message of a table."""
         rows, columns = table.shape
-        head = self._layout.filled(((rows, rows * columns), (columns, columns)), rows * columns)
+        head = self._layouts[self.schema.label_of(table)].filled(
+            ((rows, rows * columns), (columns, columns)), rows * columns
+        )
         return bytes(head + table.astype("<f8", copy=False).tobytes())
 
     def decode(self, data: bytes) -> R | None:
@@ -112,16 +114,17 @@ class TableCodec(Generic[R]):
         SchemaError
             When the table does not follow the schema.
         """
-        if not self._layout.matches(data):
+        label, layout = next(((k, each) for k, each in self._layouts.items() if each.matches(data)), ("", None))
+        if layout is None:
             return None
-        rows, columns = self._layout.sizes(data)
-        count = self._layout.count(data)
-        begin, end = self._layout.data_at, self._layout.data_at + 8 * count
+        rows, columns = layout.sizes(data)
+        count = layout.count(data)
+        begin, end = layout.data_at, layout.data_at + 8 * count
         if rows * columns != count or not end <= len(data) < end + 4:
             return None
         # The copy puts the numbers where the processor wants them: they begin at an odd multiple of four.
         numbers = np.frombuffer(data[begin:end], dtype="<f8")
-        return self.schema.decode(self.schema.label, numbers.reshape(rows, columns))
+        return self.schema.decode(label, numbers.reshape(rows, columns))
 
 
 _BURST: Final = _Layout((BURST_LABEL, *BURST_DIMENSIONS), alignment=1)

@@ -73,6 +73,52 @@ class ServiceType(Code):
     NONE = 0, "No guidance."
     C = 1, "GAST-C."
     D = 2, "GAST-D."
+    L5_100 = 3, "L5/E5a smoothed over 100 s; no standard has it."
+    L5_30 = 4, "L5/E5a smoothed over 30 s; no standard has it."
+    IF_100 = 5, "L1/E1 and L5/E5a without ionosphere, smoothed over 100 s; no standard has it."
+    IF_30 = 6, "L1/E1 and L5/E5a without ionosphere, smoothed over 30 s; no standard has it."
+
+    @property
+    def option(self) -> str:
+        """The service as options and parameters name it: ``L5-30``."""
+        return self.name.replace("_", "-")
+
+
+class ServiceCause(Code):
+    """Why a processing mode gives no service: the first condition that does not hold."""
+
+    NONE = 0, "It gives its service."
+    NO_SIGNAL = 1, "No message of a station."
+    NO_STATION_DATA = 2, "No station data (type 2)."
+    STATION_UNHEALTHY = 3, "The station's designator (GCID) allows no service."
+    STATION_NOT_FOR_SERVICE = 4, "The station's designator (GCID) does not allow this one."
+    NO_CORRECTIONS = 5, "No corrections that this mode needs."
+    MT1_TIMEOUT = 6, "No valid type 1 message for too long."
+    MT11_TIMEOUT = 7, "No valid type 11 message for too long."
+    MESSAGE_TIMEOUT = 8, "No valid message with this mode's corrections for too long."
+    NO_APPROACH_DATA = 9, "The selected approach was not received (type 4)."
+    APPROACH_NOT_FOR_SERVICE = 10, "The approach is not designated for this service (APD)."
+    NO_SERVICE_D_DATA = 11, "No station data of GAST-D (additional data block 3)."
+    NOT_AUTHENTICATED = 12, "The station does not say which slots are its own (additional data block 4)."
+    CORRECTION_AGE = 13, "The corrections are too old, or of the future."
+    NO_POSITION = 14, "Too few satellites, too weak a geometry, or the range test cannot be passed."
+    MODE_WITHOUT_SERVICE = 15, "The receiver is not set to this mode."
+    NO_EPHEMERIS_BOUND = 16, "No K_md_e, so no bound on the ephemeris error."
+    NOT_PROTECTED = 17, "A satellite used lacks something that a protection level needs."
+    VPL_ABOVE_VAL = 18, "Vertical protection level above the alert limit."
+    LPL_ABOVE_LAL = 19, "Lateral protection level above the alert limit."
+    VEB_ABOVE_VAL = 20, "Vertical ephemeris error bound above the alert limit."
+    LEB_ABOVE_LAL = 21, "Lateral ephemeris error bound above the alert limit."
+    D_VERT = 22, "The 30 s and 100 s solutions differ vertically by more than they may."
+    D_LAT = 23, "The 30 s and 100 s solutions differ laterally by more than they may."
+    B_VERT = 24, "B values of a reference receiver add up to more vertically than they may."
+    B_LAT = 25, "B values of a reference receiver add up to more laterally than they may."
+    CORRECTION_SHIFT = 26, "The corrections move the position horizontally by more than they may."
+    S_VERT = 27, "The position rests vertically too much on one satellite."
+    S_VERT_PAIR = 28, "The position rests vertically too much on two satellites."
+    S_LAT = 29, "The position rests laterally too much on one satellite."
+    S_LAT_PAIR = 30, "The position rests laterally too much on two satellites."
+    FINAL_SEGMENT = 31, "A better service is not taken up again inside the final segment."
 
 
 class ExclusionCause(Code):
@@ -147,6 +193,10 @@ class Rejection(Code):
     ELEVATION = 13, "Lower than the elevation mask."
     SIGMA = 14, "Its error model gives no number."
     RANGE_TEST = 15, "The range is far from where the other satellites put the aircraft."
+    DIVERGENCE = 16, "Code and carrier drift apart at the aircraft."
+    STEP_IN = 17, "It is too new for this mode."
+    DUAL_SOLUTION = 18, "Without it the 30 s and 100 s solutions agree."
+    RECEIVER_FAULT = 19, "Without it the B values of a reference receiver are as small as they have to be."
 
 
 class ApproachState(Code):
@@ -188,6 +238,7 @@ ENUMERATIONS: Final = (
     ChannelState,
     MonitorState,
     ServiceType,
+    ServiceCause,
     ExclusionCause,
     Rejection,
     ApproachState,

@@ -13,10 +13,12 @@ from typing import Any
 
 from gbas_msgs_py.tables import schema_dictionary
 
+_OPTIONAL = "; optional"
 _HEAD = """# The contract: tables, codes, products, modes and monitors
 
 Made by `python -m gbas_msgs_py.document`; the same stands as JSON on `/gbas/schemas` and in the metadata of every bag.
-Numbers are never given a second meaning. NaN is missing everywhere."""
+Numbers are never given a second meaning. NaN is missing everywhere. A table has its optional columns where
+one of them has a value."""
 
 
 def contract_text() -> str:
@@ -59,20 +61,35 @@ def _products(contract: dict[str, Any]) -> Iterator[str]:
 def _modes(contract: dict[str, Any]) -> Iterator[str]:
     yield "\n## Modes: what an aircraft makes of them\n"
     yield from _table(
-        ("number", "mode", "signal", "smoothing", "product", "service", "meaning"),
+        (
+            "number", "mode", "signal", "smoothing", "products", "systems", "service", "sigmas of levels",
+            "sigma_iono", "falls back to", "monitors", "meaning",
+        ),
         (
             (
                 each["number"],
                 f"`{each['name']}`",
                 each["signal"],
                 f"{each['smoothing_s']:g} s",
-                f"`{each['product']}`",
+                _words(each["products"]),
+                each["systems"],
                 each["service"],
+                _words(each["levels"] or each["products"]),
+                f"{each['levels_smoothing_s'] or each['smoothing_s']:g} s, x {each['iono_factor']:.4g}",
+                _words([each["fallback"]] if each["fallback"] else []),
+                _words(each["monitors"]),
                 each["doc"],
             )
             for each in contract["modes"]
         ),
-    )
+    )  # fmt: skip
+    yield "\n## Monitors of the aircraft\n"
+    named = contract["airborne_monitors"].items()
+    yield from _table(("monitor", "looks at"), ((f"`{name}`", doc) for name, doc in named))
+
+
+def _words(names: Iterable[str]) -> str:
+    return ", ".join(f"`{name}`" for name in names)
 
 
 def _monitors(contract: dict[str, Any]) -> Iterator[str]:
@@ -108,7 +125,10 @@ def _tables(contract: dict[str, Any]) -> Iterator[str]:
         yield f"\n## {schema['schema']}\n\n{schema['doc']}\n"
         yield from _table(
             ("column", "unit", "meaning"),
-            ((f"`{column['name']}`", column["unit"], column["doc"]) for column in schema["columns"]),
+            (
+                (f"`{column['name']}`", column["unit"], column["doc"] + (_OPTIONAL if column.get("optional") else ""))
+                for column in schema["columns"]
+            ),
         )
 
 

@@ -13,7 +13,8 @@ import numpy as np
 
 from gbas_core.record import FloatArray, Record, columns_of, per_row, per_satellite, scalar
 from gbas_core.satellites import N_SATS, RANGING_SOURCE_ID, SAT_IDS, SAT_INDEX, SOURCE_ID_INDEX
-from gbas_msgs_py.codes import MonitorState, Signal
+from gbas_msgs_py.codes import MonitorState, ServiceCause, ServiceType, Signal
+from gbas_msgs_py.modes import MODES
 from gbas_msgs_py.monitors import MONITORS, TESTS, monitor_named
 from gbas_msgs_py.products import PRODUCTS
 
@@ -26,13 +27,17 @@ BASELINES = tuple((i, j) for i in _RECEIVERS for j in _RECEIVERS if i < j)
 def by_product(columns: str, unit: str, doc: str) -> Any:
     """Declare a field ``(product, satellite)``; `columns` is the pattern of the columns' names."""
     names = tuple(columns.format(product=product.name) for product in PRODUCTS)
-    return per_satellite(unit, doc, columns=names)
+    optional = tuple(columns.format(product=product.name) for product in PRODUCTS if product.optional)
+    return per_satellite(unit, doc, columns=names, optional=optional)
 
 
 def by_receiver(columns: str, unit: str, doc: str) -> Any:
     """Declare a field ``(product, reference receiver, satellite)``; `columns` is the pattern of the columns' names."""
-    names = tuple(columns.format(product=product.name, receiver=j) for product in PRODUCTS for j in _RECEIVERS)
-    return per_satellite(unit, doc, columns=names, leading=(len(PRODUCTS), MAX_REFERENCE_RECEIVERS))
+    every = [(product, columns.format(product=product.name, receiver=j)) for product in PRODUCTS for j in _RECEIVERS]
+    names = tuple(name for _, name in every)
+    optional = tuple(name for product, name in every if product.optional)
+    leading = (len(PRODUCTS), MAX_REFERENCE_RECEIVERS)
+    return per_satellite(unit, doc, columns=names, leading=leading, optional=optional)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -40,7 +45,8 @@ class IntegrityEpoch(Record):
     """Ground corrections of one epoch after monitoring: what may be broadcast, and why the rest may not.
 
     Corrections are NaN unless `state` is USABLE. Fields of corrections have the products of
-    :data:`~gbas_msgs_py.products.PRODUCTS` as their first axis; those that a station does not make are NaN.
+    :data:`~gbas_msgs_py.products.PRODUCTS` as their first axis; those that a station does not make are NaN. Those of
+    a second frequency may be missing of a satellite that is USABLE; they are there or not as a whole.
     """
 
     n_receivers: float = scalar("-", "reference receivers in use")
@@ -261,3 +267,27 @@ class ProtectionEpoch(Record):
     val_m: float = scalar("m", "vertical alert limit, NaN without a FAS")
     lal_m: float = scalar("m", "lateral alert limit, NaN without a FAS")
     state: float = scalar("-", "ApproachState")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ModesEpoch(Record):
+    """All processing modes of one airborne epoch beside one another: a row for each mode that runs."""
+
+    mode: FloatArray = per_row("-", "number of the mode", key=True, codes=(mode.number for mode in MODES))
+    guides: FloatArray = per_row("-", "1 for the mode whose solution is that of the aircraft", codes=(0, 1))
+    service: FloatArray = per_row("-", "ServiceType the mode could give, 0 when none", codes=ServiceType)
+    cause: FloatArray = per_row("-", "ServiceCause: why it could not", codes=ServiceCause)
+    value: FloatArray = per_row("*", "what did not hold, in the unit of the cause; NaN where it has none")
+    threshold: FloatArray = per_row("*", "its bound")
+    x_m: FloatArray = per_row("m", "ECEF position")
+    y_m: FloatArray = per_row("m", "ECEF position")
+    z_m: FloatArray = per_row("m", "ECEF position")
+    n_sats: FloatArray = per_row("-", "satellites used")
+    vpl_m: FloatArray = per_row("m", "vertical protection level")
+    lpl_m: FloatArray = per_row("m", "lateral protection level")
+    veb_m: FloatArray = per_row("m", "vertical ephemeris error bound, NaN where not provided")
+    leb_m: FloatArray = per_row("m", "lateral ephemeris error bound, NaN where not provided")
+    val_m: FloatArray = per_row("m", "vertical alert limit, NaN without a FAS")
+    lal_m: FloatArray = per_row("m", "lateral alert limit, NaN without a FAS")
+    d_vert_m: FloatArray = per_row("m", "|30 s less 100 s| vertical position, 0 for modes without")
+    d_lat_m: FloatArray = per_row("m", "|30 s less 100 s| lateral position, 0 for modes without")

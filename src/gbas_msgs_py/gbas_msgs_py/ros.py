@@ -66,7 +66,7 @@ def table_to_msg(schema: TableSchema[R], record: R) -> Float64MultiArray:
     layout = MultiArrayLayout(
         dim=[
             MultiArrayDimension(label=ROWS_LABEL, size=rows, stride=rows * columns),
-            MultiArrayDimension(label=schema.label, size=columns, stride=columns),
+            MultiArrayDimension(label=schema.label_of(table), size=columns, stride=columns),
         ]
     )
     message = Float64MultiArray(layout=layout)

@@ -7,6 +7,9 @@ row is one marker row in which all but the epoch and the scalars is NaN. The lab
 
     gbas/observations/1: gps_week,tow_s,simulated,sat,code_l1_m,...
 
+Columns that a record declares as optional come last, and a table without any value there has none of them; its label
+says so.
+
 A reader compares the label with what it knows and refuses anything else: a column is never guessed at. The columns come
 from the record's own declaration (:func:`gbas_core.record.columns_of`); nothing is declared twice.
 """
@@ -105,7 +108,7 @@ class TableSchema(Generic[R]):
     Attributes
     ----------
     label : str
-        Schema, version and columns.
+        Schema, version and columns, the optional ones too.
     columns : tuple of str
     has_satellites : bool
         Whether the table has one row a satellite.
@@ -132,23 +135,40 @@ class TableSchema(Generic[R]):
             raise SchemaError(f"{self.identifier}: has fields on the satellite axis and fields of rows")
         sat = (_SAT_COLUMN, *satellite_columns) if self.has_satellites else ()
         self.columns: tuple[str, ...] = (*_EPOCH_COLUMNS, *self._scalars, *sat, *self._rows.names)
+        descriptions = _descriptions(specs, self.has_satellites)
+        # The optional columns go to the end: where each column of a whole table is among those in declared order.
+        optional = {name for _, spec in specs for name in spec.optional}
+        self._n_always = len(self.columns) - len(optional)
+        self._order = np.array(sorted(range(len(self.columns)), key=lambda place: self.columns[place] in optional))
+        self._declared = self.columns
+        self.columns = tuple(self.columns[place] for place in self._order)
+        self._descriptions = [descriptions[place] for place in self._order]
         self.label = f"{self.identifier}: {','.join(self.columns)}"
-        self._descriptions = _descriptions(specs, self.has_satellites)
+        self._short_label = f"{self.identifier}: {','.join(self.columns[: self._n_always])}"
         if len(set(self.columns)) != len(self.columns):
             raise SchemaError(f"{self.identifier}: a column is declared twice in {', '.join(self.columns)}")
 
     def __repr__(self) -> str:
         return f"TableSchema({self.label!r})"
 
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """The labels that tables may have: the whole one, and that without the optional columns if there are any."""
+        return (self.label,) if self._n_always == len(self.columns) else (self.label, self._short_label)
+
+    def label_of(self, table: FloatArray) -> str:
+        """Label of a table that :meth:`encode` made."""
+        return self.label if table.shape[1] == len(self.columns) else self._short_label
+
     def describe(self) -> dict[str, Any]:
-        """Schema as JSON-able data: label, and each column with its unit and meaning."""
+        """Schema as JSON-able data: label, and each column with its unit and meaning, and whether it is optional."""
         return {
             "schema": self.identifier,
             "label": self.label,
             "doc": (self.record_type.__doc__ or "").strip().split("\n")[0],
             "columns": [
-                {"name": name, "unit": unit, "doc": doc}
-                for name, (unit, doc) in zip(self.columns, self._descriptions, strict=True)
+                {"name": name, "unit": unit, "doc": doc} | ({} if place < self._n_always else {"optional": True})
+                for place, (name, (unit, doc)) in enumerate(zip(self.columns, self._descriptions, strict=True))
             ],
         }
 
@@ -159,7 +179,7 @@ class TableSchema(Generic[R]):
         -------
         (rows, len(columns)) float64 array, C-contiguous
             Satellites with any value, in the order of the satellite axis, or the record's rows in their order; one
-            marker row when there is none.
+            marker row when there is none. Without the optional columns where no row has a value in them.
 
         Raises
         ------
@@ -179,8 +199,23 @@ class TableSchema(Generic[R]):
             table = head[np.newaxis]
             infinite = first_infinite(table)
         self._refuse_infinite(infinite)
+        if self._n_always < len(self.columns):
+            table = self._without_optional(table)
         self._check_record(record)
         return table
+
+    def _without_optional(self, table: FloatArray) -> FloatArray:
+        """A table of declared order with the optional columns last, or without them where they are empty."""
+        places = self._order
+        if np.isnan(table[:, places[self._n_always :]]).all():
+            places = places[: self._n_always]
+        return np.ascontiguousarray(table[:, places])
+
+    def _with_optional(self, table: FloatArray) -> FloatArray:
+        """A table in declared order, missing columns NaN."""
+        whole = np.full((len(table), len(self.columns)), np.nan)
+        whole[:, self._order[: table.shape[1]]] = table
+        return whole
 
     def _block(self, record: R) -> FloatArray:
         """The satellite columns after one another."""
@@ -214,7 +249,7 @@ class TableSchema(Generic[R]):
         Parameters
         ----------
         label : str
-            The label that came with the table; must equal :attr:`label`.
+            The label that came with the table; must be one of :attr:`labels`.
         data : (rows, cols) array
 
         Raises
@@ -223,16 +258,17 @@ class TableSchema(Generic[R]):
             For another label, a wrong size, rows of different epochs or scalars, an epoch that is not finite or out of
             range, an unknown or repeated satellite, an infinite value, rows with unknown codes or the same key.
         """
-        if label != self.label:
+        if label not in self.labels:
             raise SchemaError(self._label_difference(label))
-        if data.ndim != 2 or data.shape[1] != len(self.columns) or data.shape[0] < 1:
-            raise SchemaError(
-                f"{self.identifier}: table of shape {data.shape}, expected (1 or more, {len(self.columns)})"
-            )
+        n_columns = len(self.columns) if label == self.label else self._n_always
+        if data.ndim != 2 or data.shape[1] != n_columns or data.shape[0] < 1:
+            raise SchemaError(f"{self.identifier}: table of shape {data.shape}, expected (1 or more, {n_columns})")
         if data.shape[0] > 1 and not (self.has_satellites or self.has_rows):
             raise SchemaError(f"{self.identifier}: {data.shape[0]} rows, expected 1")
         # a copy: what comes from the middleware may be read-only
         table = np.array(data, dtype=np.float64, order="C")
+        if self._n_always < len(self.columns):
+            table = self._with_optional(table)
         if self.has_satellites:
             arrays = self._decoded_satellites(table)
         elif self.has_rows:
@@ -268,7 +304,7 @@ class TableSchema(Generic[R]):
         """Refuse rows of different epochs or scalars, an impossible epoch, an infinite value."""
         if differing >= 0:
             raise SchemaError(
-                f"{self.identifier}: rows differ in {self.columns[differing]}, which is one value for the table"
+                f"{self.identifier}: rows differ in {self._declared[differing]}, which is one value for the table"
             )
         _check_epoch(self.identifier, float(table[0, 0]), float(table[0, 1]))
         self._refuse_infinite(infinite)
@@ -277,7 +313,7 @@ class TableSchema(Generic[R]):
         """Missing is NaN; an infinity is nobody's measurement."""
         if column >= 0:
             raise SchemaError(
-                f"{self.identifier}: {self.columns[column]} is infinite, expected a finite number or NaN for missing"
+                f"{self.identifier}: {self._declared[column]} is infinite, expected a finite number or NaN for missing"
             )
 
     def _label_difference(self, label: str) -> str:

@@ -13,12 +13,13 @@ from gbas_core.gnss.ephemeris import Ephemeris
 from gbas_core.gnss.observations import ObservationEpoch
 from gbas_core.record import Record, scalar
 from gbas_msgs_py.codes import enumerations
-from gbas_msgs_py.modes import mode_dictionary
+from gbas_msgs_py.modes import AIRBORNE_MONITORS, mode_dictionary
 from gbas_msgs_py.monitors import monitor_dictionary
 from gbas_msgs_py.products import product_dictionary
 from gbas_msgs_py.records import (
     ChannelEpoch,
     IntegrityEpoch,
+    ModesEpoch,
     MonitorDetailEpoch,
     MonitorEpoch,
     ProtectionEpoch,
@@ -55,6 +56,7 @@ MONITOR_DETAILS: Final = TableSchema("monitor_details", 1, MonitorDetailEpoch)
 CHANNELS: Final = TableSchema("channels", 1, ChannelEpoch)
 SOLUTION: Final = TableSchema("solution", 2, SolutionEpoch)
 PROTECTION: Final = TableSchema("protection", 2, ProtectionEpoch)
+MODES: Final = TableSchema("modes", 1, ModesEpoch)
 PROGRESS: Final = TableSchema("progress", 1, ProgressEpoch)
 TRUTH: Final = TableSchema("truth", 2, TruthEpoch)
 
@@ -69,6 +71,7 @@ SCHEMAS: Final[dict[str, TableSchema[Any]]] = {
         CHANNELS,
         SOLUTION,
         PROTECTION,
+        MODES,
         PROGRESS,
         TRUTH,
     )
@@ -112,6 +115,7 @@ def schema_dictionary() -> str:
             "enumerations": enumerations(),
             "products": product_dictionary(),
             "modes": mode_dictionary(),
+            "airborne_monitors": AIRBORNE_MONITORS,
             "monitors": monitor_dictionary(),
         },
         ensure_ascii=True,

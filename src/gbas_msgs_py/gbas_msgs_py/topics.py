@@ -33,6 +33,7 @@ AIRBORNE_EPHEMERIS: Final = "airborne/ephemeris"
 """What the aircraft received where that differs from the station: remap ``/gbas/ephemeris`` of its receiver to it."""
 AIRBORNE_SOLUTION: Final = "airborne/solution"
 AIRBORNE_PROTECTION: Final = "airborne/protection_levels"
+AIRBORNE_MODES: Final = "airborne/modes"
 AIRBORNE_FIX: Final = "airborne/fix"
 AIRBORNE_VPL: Final = "airborne/vpl"
 AIRBORNE_LPL: Final = "airborne/lpl"
@@ -99,6 +100,7 @@ TOPICS: Final[tuple[TopicSpec, ...]] = (
     TopicSpec(name=VDB, message_type="std_msgs/msg/UInt8MultiArray", schema="gbas/vdb_burst/1"),
     TopicSpec(name=AIRBORNE_SOLUTION, message_type=_TABLE, schema="gbas/solution/2"),
     TopicSpec(name=AIRBORNE_PROTECTION, message_type=_TABLE, schema="gbas/protection/2"),
+    TopicSpec(name=AIRBORNE_MODES, message_type=_TABLE, schema="gbas/modes/1"),
     TopicSpec(name=AIRBORNE_FIX, message_type="sensor_msgs/msg/NavSatFix"),
     *(TopicSpec(name=n, message_type=_FLOAT) for n in (AIRBORNE_VPL, AIRBORNE_LPL, AIRBORNE_VAL, AIRBORNE_LAL)),
     TopicSpec(name=AIRBORNE_SERVICE, message_type="std_msgs/msg/UInt8"),

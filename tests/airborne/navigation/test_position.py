@@ -181,7 +181,7 @@ def test_settling_factor_is_the_variance_of_the_filter() -> None:
         weights = np.append(weights * (1.0 - new), new)
         if n in (20, 100, 200, 300, 600, 1400):
             exact = math.sqrt((weights**2).sum() * 2.0 * tau / interval)
-            factor = float(settling_factor(n * interval, tau))
+            factor = float(settling_factor(n * interval, tau, 100.0))
             # The steady filter of discrete steps has T/(2 tau - T) for T/(2 tau): 0.25 % in variance.
             assert factor == pytest.approx(exact, rel=3e-3)
 

@@ -16,7 +16,7 @@ from gbas_airborne.reception.vdb_state import ReceptionState
 from gbas_core.gnss.gpstime import modified_z_count_s
 from gbas_core.satellites import SAT_INDEX, SOURCE_ID_INDEX
 from gbas_msgs_py.events import Event
-from gbas_vdb.messages.types import Correction30, Correction100, Type1, Type3, Type4, Type11
+from gbas_vdb.messages.types import Correction30, Correction100, Type1, Type3, Type4, Type8, Type11
 from gbas_vdb.transmission.burst import Burst
 
 TOW_S = 345_600.5
@@ -513,3 +513,57 @@ def test_more_satellites_than_one_message_holds() -> None:
     flight = Flight(world, AirborneParams(settle_s=2.0, elevation_mask_rad=math.radians(5.0)))
     flight.run(0.0, 3.0)
     assert np.isfinite(flight.state.position.reception.vdb.corrections["l1_100"].listed).sum() == 22
+
+
+# --- corrections of a second frequency
+
+
+def type8(*sources: int, kind: int = 0, flag: int = 0, tow_s: float = TOW_S, **changes: object) -> Type8:
+    return Type8(
+        modified_z_count_s=modified_z_count_s(tow_s),
+        additional_message_flag=flag,
+        measurement_type=kind,
+        measurements=corrections(*sources, **changes),
+    )
+
+
+def test_private_messages_are_corrections_of_their_product() -> None:
+    state, events = received(frame(type8(5, 71), type8(5, kind=1, prc_m=-2.5)), state=selected())
+    assert set(state.corrections) == {"l5_100", "l5_30"}
+    assert np.flatnonzero(np.isfinite(state.corrections["l5_100"].listed)).tolist() == [4, SAT_INDEX["E01"]]
+    assert state.corrections["l5_30"].prc_m[4] == pytest.approx(-2.5, abs=1e-12)
+    assert state.corrections["l5_30"].received == (WEEK, TOW_S)
+    assert not events
+    assert state.counts.unusable == 0
+
+
+def test_halves_of_a_private_pair_make_a_set_in_either_order_within_one_frame() -> None:
+    first, second = type8(5, flag=1), type8(6, flag=3)
+    for order in ((first, second), (second, first)):
+        state, _ = received(frame(*order), state=selected())
+        assert np.flatnonzero(np.isfinite(state.corrections["l5_100"].listed)).tolist() == [4, 5]
+        assert state.counts.unpaired == 0
+    state, _ = received(frame(first), state=selected())
+    assert "l5_100" not in state.corrections
+    later = TOW_S + 0.5
+    state, _ = received(frame(type8(6, flag=3, tow_s=later), tow_s=later), state=state, tow_s=later)
+    assert "l5_100" not in state.corrections
+    assert state.counts.unpaired == 1
+    state, _ = received(frame(type8(7, tow_s=later), tow_s=later), state=state, tow_s=later)
+    assert np.flatnonzero(np.isfinite(state.corrections["l5_100"].listed)).tolist() == [6]
+    assert state.counts.unpaired == 2
+
+
+def test_pairs_of_two_products_do_not_mix() -> None:
+    state, _ = received(frame(type8(5, flag=1), type8(6, flag=3, kind=1)), state=selected())
+    assert not state.corrections
+
+
+def test_private_messages_that_cannot_be_used_are_counted() -> None:
+    state, _ = received(frame(type8(5, kind=2)), state=selected())
+    assert state.counts.unusable == 1
+    state, _ = received(frame(type8(5)))  # before station data
+    assert state.counts.unusable == 1
+    state, events = received(frame(type8(5, tow_s=TOW_S - 60.0)), state=selected())
+    assert not state.corrections
+    assert [(event.subject, event.cause) for event in events] == [("type8", "z_count")]

@@ -112,7 +112,14 @@ def test_residuals_of_channels_that_are_not_used_are_those_of_arrays(seed, recei
     correction, _, usable, _, elevation = scene(seed, receivers, 0.8, strange)
     settled = usable | (np.random.default_rng(seed).random(usable.shape) < 0.5)
     _, common, _, _, _, prc, *_ = kernels.form_corrections(
-        correction, correction, 0.5, usable, np.zeros(N_SATS, dtype=np.int64), elevation, np.empty(0), given_settings
+        correction,
+        correction,
+        0.5,
+        usable,
+        np.zeros(N_SATS, dtype=np.int64),
+        elevation,
+        np.empty((0, N_SATS)),
+        given_settings,
     )
     found = kernels.residual_m(correction, settled, common, prc, given_settings)
     with np.errstate(all="ignore"):

@@ -16,16 +16,23 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gbas_airborne.modes import product_of
-from gbas_airborne.navigation.kernels.position import ELEVATION, RANGE_ERROR, Conditions, tested_positions
-from gbas_airborne.params import AirborneParams
+from gbas_airborne.modes import air_model, processing_of
+from gbas_airborne.navigation.kernels.position import (
+    ELEVATION,
+    LEVELS,
+    RANGE_ERROR,
+    WEIGHTS,
+    Conditions,
+    tested_positions,
+)
+from gbas_airborne.params import OF_LEVELS, AirborneParams
 from gbas_airborne.ranging.corrected_ranges import RangingSources
 from gbas_airborne.reception.columns import SIGMA
-from gbas_airborne.reception.station_data import Corrections, StationData
-from gbas_core.models.error_models import AAD_A, AAD_B
+from gbas_airborne.reception.station_data import StationData
 from gbas_core.positioning.approach import FinalApproach
 from gbas_core.record import FloatArray, IntArray
 from gbas_core.satellites import CLOCK_GROUPS
+from gbas_msgs_py.codes import ServiceCause, ServiceType
 from gbas_msgs_py.modes import Mode
 
 GROUP: Final[IntArray] = CLOCK_GROUPS.argmax(axis=0)
@@ -56,7 +63,6 @@ class PositionInputs(NamedTuple):
 
     sources: RangingSources
     reason: NDArray[np.int64]
-    corrections: Corrections
     prior: Prior
 
 
@@ -85,6 +91,14 @@ class Fix:
     projection: FloatArray
 
 
+class Withheld(NamedTuple):
+    """Why a position that was found is not used: the cause, the number and its bound."""
+
+    cause: ServiceCause
+    value: float
+    threshold: float
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PositionResult:
     """What became of the search for a position.
@@ -101,7 +115,12 @@ class PositionResult:
     range_error_m : (N_SATS,) array or None
         Error of the satellites the range test excluded [m]; NaN for others.
     fix : Fix or None
-        None with too few satellites, too weak a geometry, without convergence, or when the range test cannot be passed.
+        None with too few satellites, too weak a geometry, without convergence, when the range test cannot be passed, or
+        when it is withheld.
+    withheld : Withheld or None
+        What stands against the position.
+    failed : Withheld or None
+        That, or what stood against the position before satellites were left out.
     """
 
     sources: RangingSources
@@ -110,6 +129,8 @@ class PositionResult:
     elevation_rad: FloatArray | None = None
     range_error_m: FloatArray | None = None
     fix: Fix | None = None
+    withheld: Withheld | None = None
+    failed: Withheld | None = None
 
 
 def find_positions(
@@ -123,11 +144,13 @@ def find_positions(
         np.array([each.sources.range_m for each in inputs]),
         np.array([each.sources.satellite_m for each in inputs]),
         np.array([each.sources.noise_factor for each in inputs]),
-        np.array([each.corrections.columns[SIGMA] for each in inputs]),
+        np.array([(each.sources.applied[SIGMA], each.sources.weight_sigma_m) for each in inputs]),
         station.reference_ecef_m,
         np.array(recent),
         np.array([each.prior.dt_s for each in inputs]),
-        np.array([_smoothing_s(each.sources.mode) for each in inputs]),
+        np.array([processing_of(each.sources.mode).coefficient for each in inputs]),
+        _curves(tuple(each.sources.mode for each in inputs), params),
+        np.array([_iono(each.sources.mode, station) for each in inputs]),
         approach.rot_approach_ecef if approach is not None else _NO_APPROACH,
         GROUP,
         len(CLOCK_GROUPS),
@@ -154,25 +177,30 @@ def find_positions(
     ]
 
 
-@lru_cache(maxsize=64)
-def _smoothing_s(mode: Mode) -> float:
-    """Time constant of the ionospheric sigma: corrections are smoothed over theirs, whatever the aircraft does [s]."""
-    return float(max(mode.smoothing_s, product_of(mode).smoothing_s))
+@lru_cache(maxsize=8)
+def _curves(modes: tuple[Mode, ...], params: AirborneParams) -> FloatArray:
+    """Curves of airborne noise and multipath of modes, (M, 2, groups, C, 6)."""
+    curves: FloatArray = np.array([air_model(mode, params.aad).curves for mode in modes])
+    for row, mode in enumerate(modes):
+        if mode.levels and params.gast_d.weights == OF_LEVELS:
+            curves[row, WEIGHTS] = curves[row, LEVELS]
+    return curves
+
+
+def _iono(mode: Mode, station: StationData) -> tuple[float, float, float]:
+    """sigma_vig, ionospheric delay over that on L1, and time constant."""
+    gradient = station.sigma_vig_d if mode.service is ServiceType.D else station.sigma_vig
+    return float(gradient), mode.iono_factor, processing_of(mode).iono_tau_s
 
 
 def _conditions(station: StationData, params: AirborneParams) -> Conditions:
-    noise = AAD_A if params.aad == "A" else AAD_B
     return Conditions(
         height_m=float(station.reference_height_m),
         d_max_m=float(station.d_max_m),
-        sigma_vig=float(station.sigma_vig),
         refractivity=float(station.refractivity),
         refractivity_uncertainty=float(station.refractivity_uncertainty),
         scale_height_m=float(station.scale_height_m),
         mask_rad=float(params.elevation_mask_rad),
-        noise_a0_m=noise.a0_m,
-        noise_a1_m=noise.a1_m,
-        noise_theta0_deg=noise.theta0_deg,
         assumed_mps=float(params.max_speed_mps),
         max_condition=float(params.max_condition),
         max_iterations=int(params.max_iterations),

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from functools import partial
 from typing import Any
 
+from gbas_airborne.modes import configured_modes
 from gbas_airborne.nodes.configuration import receiver_params
 from gbas_airborne.receiver import AirborneReceiver, PositionState
 from gbas_airborne.reception.receive import AirborneEpoch
@@ -32,6 +33,11 @@ class Positioning(GbasNode):
             correction_wait_s=self.receiver.correction_wait_s, timeout_s=self.params.join_timeout_s
         )
         self.solution = self.table_publisher(topics.AIRBORNE_SOLUTION, tables.SOLUTION, readers=1)
+        self.modes = (
+            self.table_publisher(topics.AIRBORNE_MODES, tables.MODES)
+            if len(configured_modes(self.receiver)) > 1
+            else None
+        )
         self.publish_schemas()
         self.ephemerides = self.ephemeris_input()
         self.burst_subscription(topics.VDB, self.on_burst)
@@ -65,10 +71,11 @@ class Positioning(GbasNode):
             bursts=joined.bursts,
             ephemerides=self.ephemerides.take(joined.key),
         )
-        self.state, solutions, events = AirborneReceiver.position(self.state, epoch, self.receiver)
-        for solution in solutions:
-            self.solution.publish(solution)
-        self.publish_events(events)
+        self.state, selected = AirborneReceiver.position(self.state, epoch, self.receiver)
+        self.solution.publish(selected.solutions[0])
+        if self.modes is not None and selected.modes is not None:
+            self.modes.publish(selected.modes)
+        self.publish_events(selected.events)
         self.finished_epoch(week, tow_s)
 
     def details(self) -> dict[str, Any]:

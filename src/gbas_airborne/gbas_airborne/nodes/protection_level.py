@@ -8,7 +8,7 @@ from typing import Any
 
 from sensor_msgs.msg import NavSatFix
 
-from gbas_airborne.modes import configured_modes
+from gbas_airborne.modes import guiding_modes
 from gbas_airborne.nodes.configuration import receiver_params
 from gbas_airborne.receiver import AirborneReceiver
 from gbas_airborne.service import ServiceState
@@ -30,8 +30,8 @@ class ProtectionLevel(GbasNode):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("protection_level", **kwargs)
         self.receiver = receiver_params(self, self.params.config)
-        self.modes = tuple(mode.number for mode in configured_modes(self.receiver))
-        self.states = dict.fromkeys(self.modes, ServiceState())
+        self.modes = tuple(mode.number for mode in guiding_modes(self.receiver))
+        self.state = ServiceState()
         self.service_told = int(ServiceType.NONE)
         self.protection = self.table_publisher(topics.AIRBORNE_PROTECTION, tables.PROTECTION)
         self.service = self.uint8_publisher(topics.AIRBORNE_SERVICE)
@@ -48,18 +48,15 @@ class ProtectionLevel(GbasNode):
         self.when_ready(partial(self.step, solution))
 
     def step(self, solution: SolutionEpoch) -> None:
-        """One solution: its protection levels, and the service if it is of the mode that guidance is from."""
+        """One solution: its protection levels and the service."""
         if solution.mode not in self.modes:
             self.problem("solution of a mode that is not configured")
             return
-        mode = int(solution.mode)
-        self.states[mode], protection, events = AirborneReceiver.protect(self.states[mode], solution, self.receiver)
+        self.state, protection, events = AirborneReceiver.protect(self.state, solution, self.receiver)
         self.protection.publish(protection)
-        if mode == self.modes[0]:
-            self.guide(solution, protection)
+        self.guide(solution, protection)
         self.publish_events(events)
-        if mode == self.modes[-1]:
-            self.finished_epoch(solution.gps_week, solution.tow_s)
+        self.finished_epoch(solution.gps_week, solution.tow_s)
 
     def guide(self, solution: SolutionEpoch, protection: ProtectionEpoch) -> None:
         """Tell the service, and what is plotted beside it."""

@@ -9,6 +9,7 @@ Source: RTCA DO-253 (approach protection levels); ICAO Annex 10 vol. I, App. B 3
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -71,16 +72,21 @@ def protection_levels(solution: SolutionEpoch, multipliers: Multipliers) -> Prot
 
     Source: ICAO Annex 10 vol. I, App. B 3.6.5.5.
     """
-    rows = [getattr(solution, name) for name in COLUMNS]
-    scalars = solution.n_receivers, solution.k_md_e, solution.d_vert_m, solution.d_lat_m
-    n_receivers, k_md_e, *separation_m = map(float, scalars)
-    h0_m, h1_m, level_m, ephemeris_bound_m = all_levels(
-        np.array([rows]),
-        np.array([solution.b_m]),
-        np.array([n_receivers]),
-        np.array([k_md_e]),
-        np.array([separation_m]),
+    return levels_of_all((solution,), multipliers)[0]
+
+
+def levels_of_all(solutions: Sequence[SolutionEpoch], multipliers: Multipliers) -> tuple[ProtectionLevels, ...]:
+    """The same of several solutions at once."""
+    found = all_levels(
+        np.array([[getattr(each, name) for name in COLUMNS] for each in solutions]),
+        np.array([each.b_m for each in solutions]),
+        np.array([float(each.n_receivers) for each in solutions]),
+        np.array([float(each.k_md_e) for each in solutions]),
+        np.array([(float(each.d_vert_m), float(each.d_lat_m)) for each in solutions]),
         multipliers.k_ffmd,
         multipliers.k_md,
-    )[0]
-    return ProtectionLevels(h0_m=h0_m, h1_m=h1_m, level_m=level_m, ephemeris_bound_m=ephemeris_bound_m)
+    )
+    return tuple(
+        ProtectionLevels(h0_m=h0_m, h1_m=h1_m, level_m=level_m, ephemeris_bound_m=bound_m)
+        for h0_m, h1_m, level_m, bound_m in found
+    )

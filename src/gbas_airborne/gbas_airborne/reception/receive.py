@@ -14,6 +14,7 @@ from gbas_core.gnss.epoch_order import Arrival, EpochOrder
 from gbas_core.gnss.gpstime import epoch_key, seconds_between
 from gbas_core.gnss.observations import ObservationEpoch
 from gbas_core.positioning.approach import FinalApproach
+from gbas_core.record import FloatArray
 from gbas_msgs_py.codes import EventKind
 from gbas_msgs_py.events import Event, EventLog
 from gbas_vdb.transmission.burst import Burst
@@ -86,6 +87,8 @@ class Received:
         The one selected.
     corrections : mapping from a product's name to Corrections
     checks : EphemerisChecks
+    p_d : (N_SATS,) array or None
+        Decorrelation of the ephemeris error for GAST-D [m/m].
     events : tuple of Event
         What happened in this stage.
     """
@@ -100,6 +103,7 @@ class Received:
     corrections: Mapping[str, Corrections]
     checks: EphemerisChecks
     events: tuple[Event, ...]
+    p_d: FloatArray | None = None
 
     @property
     def epoch_ms(self) -> int:
@@ -138,6 +142,7 @@ def receive(state: ReceiveState, epoch: AirborneEpoch, params: AirborneParams) -
         corrections=vdb.corrections,
         checks=vdb.checks,
         events=events.all(),
+        p_d=vdb.p_d,
     )
     return state, received
 

@@ -17,7 +17,7 @@ from gbas_core.positioning.approach import FinalApproach
 from gbas_core.record import FloatArray
 from gbas_core.satellites import SOURCE_ID_INDEX, missing
 from gbas_msgs_py.records import MAX_REFERENCE_RECEIVERS
-from gbas_vdb.messages.types import Correction100, FasDataSet, Type2
+from gbas_vdb.messages.types import AdditionalBlock3, Correction100, FasDataSet, Type2
 
 # Known (ICAO Annex 10 vol. I, table B-65): 1 to 4 are healthy, 7 is unhealthy; 0, 5 and 6 mean nothing and give no
 # service.
@@ -40,6 +40,10 @@ class StationData:
     k_md_e: float
     rsds: int | None
     slots: tuple[int, ...] | None
+    k_md_e_d: float = math.nan
+    sigma_vig_d: float = math.nan
+    y_eig_m: float = math.nan
+    m_eig: float = math.nan
 
     @property
     def healthy(self) -> bool:
@@ -162,7 +166,20 @@ def station_data(message: Type2) -> StationData:
         k_md_e=k_md_e,
         rsds=adb1.reference_station_data_selector if adb1 is not None else None,
         slots=message.adb4.slots if message.adb4 is not None else None,
+        **_service_d(message.adb3),
     )
+
+
+def _service_d(block: AdditionalBlock3 | None) -> dict[str, float]:
+    """What GAST-D adds; as for C, a multiplier of zero is none."""
+    if block is None:
+        return {}
+    return {
+        "k_md_e_d": block.k_md_e_d_gps if block.k_md_e_d_gps > 0.0 else math.nan,
+        "sigma_vig_d": block.sigma_vert_iono_gradient_d,
+        "y_eig_m": block.y_eig_m,
+        "m_eig": block.m_eig,
+    }
 
 
 def final_approach(data_set: FasDataSet) -> FinalApproach:

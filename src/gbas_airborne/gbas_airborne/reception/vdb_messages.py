@@ -15,6 +15,8 @@ from typing import Final
 
 from gbas_airborne.modes import PRODUCT_OF_MEASUREMENT
 from gbas_airborne.params import NO_FAS, AirborneParams
+from gbas_airborne.reception.second_frequency import PRODUCT_OF_PRIVATE, whole_set
+from gbas_airborne.reception.service_d import joined, with_decorrelation
 from gbas_airborne.reception.station_data import (
     EphemerisChecks,
     correction_set,
@@ -29,7 +31,7 @@ from gbas_core.satellites import SOURCE_ID_INDEX
 from gbas_msgs_py.codes import EventKind
 from gbas_msgs_py.events import Event, EventLog
 from gbas_vdb.messages.block import MessageBlock
-from gbas_vdb.messages.types import Correction100, FasDataSet, Type1, Type2, Type4, Type11
+from gbas_vdb.messages.types import Correction100, FasDataSet, Type1, Type2, Type4, Type8, Type11
 from gbas_vdb.transmission.burst import FRAME_DURATION_S, SLOT_NAMES, Burst
 from gbas_vdb.transmission.receive import decode_burst
 
@@ -76,6 +78,7 @@ def reception_step(
     intake.count(failed=malformed)
     for burst in ready:
         intake.take(burst)
+        intake.join_type11()
     intake.expire()
     return intake.finished(), intake.events.all()
 
@@ -151,6 +154,8 @@ class _VdbMessageProcessor:
             self._take_type4(message, burst)
         elif isinstance(message, Type11):
             self._take_type11(message, burst)
+        elif isinstance(message, Type8):
+            self._take_type8(message, burst)
         heard = (burst.gps_week, burst.tow_s)
         if self.state.station_id == block.station_id and self.state.heard != heard:
             self.state.heard = heard
@@ -245,6 +250,26 @@ class _VdbMessageProcessor:
         kept = tuple(m for m in kept if m.modified_z_count_s == message.modified_z_count_s)
         self.state.type11 = (*kept, message)
         self.state.type11_frame = frame
+        self.state.p_d = with_decorrelation(self.state.p_d, message)
+
+    def join_type11(self) -> None:
+        """Corrections of GAST-D, where messages of both types of one instant are there."""
+        self.state.corrections = joined(self.state.corrections, self.state.type11, self.state.type11_frame)
+
+    def _take_type8(self, message: Type8, burst: Burst) -> None:
+        """Corrections of a second frequency: a message, or a linked pair in one frame."""
+        kind = message.measurement_type
+        if kind not in PRODUCT_OF_PRIVATE:
+            self.count(unusable=1)
+            return
+        before = self.state.pending_private.get(kind)
+        waiting, measurements = whole_set(before, message, burst)
+        paired = measurements is not None and message.additional_message_flag != 0
+        self.count(unpaired=int(before is not None and not paired))
+        pending = {other: half for other, half in self.state.pending_private.items() if other != kind}
+        self.state.pending_private = pending if waiting is None else {**pending, kind: waiting}
+        if measurements is not None:
+            self._take_set(PRODUCT_OF_PRIVATE[kind], "type8", message.modified_z_count_s, measurements, burst)
 
     def _drop_pending(self) -> None:
         """Half of a linked pair whose other half did not come is never used."""
@@ -269,19 +294,25 @@ class _VdbMessageProcessor:
 
     def _take_corrections(self, message: Type1, measurements: tuple[Correction100, ...], burst: Burst) -> None:
         """A complete set of corrections of the message's product."""
+        product = PRODUCT_OF_MEASUREMENT[message.measurement_type]
+        self._take_set(product, "type1", message.modified_z_count_s, measurements, burst)
+
+    def _take_set(
+        self, product: str, subject: str, z_count_s: float, measurements: tuple[Correction100, ...], burst: Burst
+    ) -> None:
+        """A complete set of corrections of a product; `subject` is what an event is about."""
         try:
-            week, tow_s = resolve_modified_z_count(message.modified_z_count_s, burst.gps_week, burst.tow_s)
+            week, tow_s = resolve_modified_z_count(z_count_s, burst.gps_week, burst.tow_s)
         except ValueError:
             self.count(unusable=1)
             return
         age_s = seconds_between(week, tow_s, burst.gps_week, burst.tow_s)
-        product = PRODUCT_OF_MEASUREMENT[message.measurement_type]
         newest = self.state.corrections.get(product)
         # A Z-count is that of the frame or a little before; one from the future, or older than what we have, is wrong.
         late = newest is not None and seconds_between(newest.gps_week, newest.tow_s, week, tow_s) < 0.0
         if late or not -0.5 * FRAME_DURATION_S <= age_s <= self.params.correction_timeout_s:
             self.count(unusable=1)
-            self.events.add(EventKind.INPUT, "type1", "z_count", age_s, self.params.correction_timeout_s)
+            self.events.add(EventKind.INPUT, subject, "z_count", age_s, self.params.correction_timeout_s)
             return
         corrections = correction_set((week, tow_s), (burst.gps_week, burst.tow_s), measurements)
         self.state.corrections = {**self.state.corrections, product: corrections}

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from gbas_airborne.reception.second_frequency import Half
 from gbas_airborne.reception.station_data import Corrections, EphemerisChecks, StationData
 from gbas_core.positioning.approach import FinalApproach
+from gbas_core.record import FloatArray
 from gbas_vdb.messages.types import Type1, Type2, Type11
 from gbas_vdb.transmission.burst import Burst
 
@@ -44,8 +46,12 @@ class ReceptionState:
         The last complete set of each product received.
     pending_pair, pending_frame
         First half of a linked pair, and the frame it came in.
+    pending_private
+        First halves of linked pairs of private messages, by their measurement type.
     type11, type11_frame
         The 30 s corrections of one frame, and which.
+    p_d : (N_SATS,) array or None
+        P_D as type 11 messages sent it [m/m].
     """
 
     station_id: str | None = None
@@ -59,7 +65,9 @@ class ReceptionState:
     checks: EphemerisChecks = field(default_factory=EphemerisChecks)
     pending_pair: Type1 | None = None
     pending_frame: tuple[int, float] | None = None
+    pending_private: Mapping[int, Half] = field(default_factory=dict)
     type11: tuple[Type11, ...] = ()
     type11_frame: tuple[int, float] | None = None
+    p_d: FloatArray | None = None
     waiting: tuple[Burst, ...] = ()
     counts: Counts = field(default_factory=Counts)

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 
 from gbas_core.compiled import as_written, compiled
 from gbas_core.record import FloatArray
+from gbas_core.signals import IONO_RATIO, L5
 
 GroundAccuracy = Literal["A", "B", "C"]
 AirborneAccuracy = Literal["A", "B"]
@@ -181,6 +182,33 @@ def sigma_pr_gnd(
         low = ground_curve_m(GAD_C_LOW, elevation_rad, n_receivers, mask_rad=mask_rad)
         return np.where(np.rad2deg(np.asarray(elevation_rad)) > GAD_C_STEP_DEG + EDGE_DEG, high, low)
     raise ValueError(f"ground accuracy designator {gad!r} is not A, B or C")
+
+
+def sigma_ionosphere_free_m(sigma_l1_m: ArrayLike, sigma_l5_m: ArrayLike, correlation: ArrayLike = 0.0) -> FloatArray:
+    """Error of the ionosphere-free combination of two ranges, from theirs.
+
+    Parameters
+    ----------
+    sigma_l1_m, sigma_l5_m : array_like
+        Standard deviations on L1/E1 and on L5/E5a, of one smoothing time constant [m].
+    correlation : array_like
+        Correlation of the two errors; 0 is eq (7). Errors that go together cancel in part: a measured correlation
+        above 0 gives less, one below 0 more.
+
+    Returns
+    -------
+    array
+        Standard deviation [m]; NaN where a sigma is missing or negative, or a correlation is not within -1 to 1.
+
+    Source: Caamano et al., eq (7), f1^2/(f1^2 - f5^2) = gamma/(gamma - 1) and f5^2/(f1^2 - f5^2) = 1/(gamma - 1); with
+    correlation, the variance of a difference.
+    """
+    first, second, rho = (np.asarray(value, dtype=np.float64) for value in (sigma_l1_m, sigma_l5_m, correlation))
+    first, second = (np.where(value >= 0.0, value, np.nan) for value in (first, second))
+    rho = np.where(np.abs(rho) <= 1.0, rho, np.nan)
+    first, second = IONO_RATIO[L5] / (IONO_RATIO[L5] - 1.0) * first, second / (IONO_RATIO[L5] - 1.0)
+    # (a - b)^2 + 2 ab (1 - rho): never negative in floating point
+    return np.asarray(np.sqrt((first - second) ** 2 + 2.0 * first * second * (1.0 - rho)))
 
 
 def sigma_noise_air(aad: AirborneAccuracy, elevation_rad: ArrayLike, *, mask_rad: float = MASK_RAD) -> FloatArray:

@@ -32,7 +32,7 @@ from gbas_ground.params import GroundParams
 
 _OBSERVED: Final = ("code_m", "carrier_m", "doppler_hz", "cn0_dbhz", "lli")
 SMOOTHED_BANDS: Final = (L1,)
-"""Bands whose codes are smoothed: those there are corrections of."""
+"""Bands whose codes every station smooths: those there are always corrections of."""
 
 
 class RawEpoch(NamedTuple):

@@ -8,14 +8,14 @@ import numpy as np
 
 from gbas_core.models.error_models import GROUND_CURVES
 from gbas_core.record import FloatArray
-from gbas_core.satellites import CLOCK_GROUPS
+from gbas_core.satellites import CLOCK_GROUPS, N_SATS
 from gbas_ground.corrections.kernels.consistency import Settings, broadcast_sigmas_m
 from gbas_ground.params import GroundParams
 
 MAX_SIGMA_M: Final = 5.08
 """Largest sigma a message can carry. Source: ICAO Annex 10 vol. I, table B-63."""
 
-_NOTHING: Final[FloatArray] = np.empty(0)
+_NOTHING: Final[FloatArray] = np.empty((0, N_SATS))
 
 
 class Sigmas(NamedTuple):
@@ -52,11 +52,11 @@ def broadcast_sigmas(params: GroundParams, elevation_rad: FloatArray, count: Flo
 
 
 def measured_sigma_m(params: GroundParams, elevation_rad: FloatArray) -> FloatArray:
-    """One receiver's measured sigma ``(N,)`` [m]; empty where the station has a designator instead."""
+    """One receiver's measured sigma ``(1, N)`` [m]; no row where the station has a designator instead."""
     accuracy = params.accuracy
     if not accuracy.sigma_elevation_rad:
         return _NOTHING
-    return np.asarray(np.interp(elevation_rad, accuracy.sigma_elevation_rad, accuracy.sigma_m))
+    return np.interp(elevation_rad, accuracy.sigma_elevation_rad, accuracy.sigma_m)[np.newaxis]
 
 
 def settings_of(params: GroundParams) -> Settings:

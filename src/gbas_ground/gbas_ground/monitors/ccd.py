@@ -24,13 +24,14 @@ from gbas_core.ranging.divergence import (
 )
 from gbas_core.record import BoolArray, FloatArray
 from gbas_core.satellites import N_SATS, missing
-from gbas_core.signals import L1, N_BANDS
+from gbas_core.signals import L1, L5, N_BANDS
 from gbas_ground.monitors.false_alarm import exposure_probability, least_correlation
-from gbas_ground.monitors.interface import MonitoredEpoch, MonitorOutput, SignalMonitor, verdicts
+from gbas_ground.monitors.interface import MonitoredEpoch, MonitorOutput, SecondBandOutput, SignalMonitor, verdicts
 from gbas_ground.monitors.kernels import ccd as kernels
 from gbas_ground.monitors.kernels.divergence_filter import initial_memory
 from gbas_ground.monitors.monitor_table import summarise
 from gbas_ground.monitors.result import MonitorResult, upper_limit
+from gbas_msgs_py.codes import Signal
 from gbas_msgs_py.monitors import CCD
 from gbas_msgs_py.records import MAX_REFERENCE_RECEIVERS
 
@@ -195,7 +196,10 @@ def _initial(station: PreparedStation) -> CcdState:
 
 
 def _step(state: CcdState, epoch: MonitoredEpoch) -> tuple[CcdState, MonitorOutput]:
-    """Corrections are on L1: its rates count."""
+    """The rates of L1 count for the satellite; those of L5, where it is corrected too, for its corrections there alone.
+
+    What L1 may be used for rests on the rates of L1.
+    """
     inputs = epoch.inputs
     params = inputs.station.ccd
     seen = CcdInput(inputs.code_m, inputs.carrier_m, inputs.slipped, inputs.ready)
@@ -212,6 +216,22 @@ def _step(state: CcdState, epoch: MonitoredEpoch) -> tuple[CcdState, MonitorOutp
         details={"ccd_receiver_mps": by_receiver},
         satellites=verdicts(params.exclude, test.cause, result, inputs.due, power=1),
         ready=found.receivers[L1] > 0 if params.exclude else None,
+        second=_second(found, epoch) if inputs.station.second is not None else None,
+    )
+
+
+def _second(found: CcdEpoch, epoch: MonitoredEpoch) -> SecondBandOutput:
+    """What L5 says, with the same threshold: the ionosphere diverges it 1.8 times as much as L1."""
+    inputs, test = epoch.inputs, CCD.test("rate")
+    params, of_bands = inputs.station.ccd, found.satellites
+    result = MonitorResult(
+        statistic=of_bands.statistic[L5], threshold=of_bands.threshold[L5], failed=of_bands.failed[L5]
+    )
+    measured = found.receivers[L5] > 0
+    return SecondBandOutput(
+        summaries={CCD.key(test.name): summarise(result, inputs.due & measured, Signal.L5)},
+        satellites=verdicts(params.exclude, test.cause, result, inputs.due, power=1),
+        ready=measured if params.exclude else None,
     )
 
 

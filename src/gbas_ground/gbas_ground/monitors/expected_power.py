@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Annotated, Final, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,7 +26,14 @@ from gbas_core.record import BoolArray, FloatArray, IntArray
 from gbas_core.satellites import N_SATS
 from gbas_core.signals import L1, L5, N_BANDS
 from gbas_ground.monitors.false_alarm import EPOCH_S, FALSE_EXCLUSION, false_alarm_multiplier
-from gbas_ground.monitors.interface import MonitoredEpoch, MonitorOutput, SignalMonitor, Verdict, verdicts
+from gbas_ground.monitors.interface import (
+    MonitoredEpoch,
+    MonitorOutput,
+    SecondBandOutput,
+    SignalMonitor,
+    Verdict,
+    verdicts,
+)
 from gbas_ground.monitors.kernels import power as kernels
 from gbas_ground.monitors.monitor_table import moved, signal_of, summarise, worst_of
 from gbas_ground.monitors.result import MonitorResult
@@ -244,6 +251,8 @@ def _step(state: PowerExpectationState, epoch: MonitoredEpoch) -> tuple[PowerExp
     state, found = power_expectation_step(
         state, inputs.cn0_dbhz, due, inputs.predicted.elevation_rad, inputs.dt_s, params
     )
+    if inputs.station.second is not None and len(params.bands) > 1:
+        return state, _by_band(found, np.logical_or.reduce(due), epoch)
     summary = summarise(found.satellites, np.logical_or.reduce(due), signal_of(params.bands))
     satellites = MonitorResult(statistic=summary.statistic, threshold=summary.threshold, failed=summary.failed)
     test = EXPECTED_POWER.test("satellite")
@@ -255,6 +264,32 @@ def _step(state: PowerExpectationState, epoch: MonitoredEpoch) -> tuple[PowerExp
         satellites=verdicts(params.exclude, test.cause, satellites, inputs.due),
         channels=channels,
     )
+
+
+def _by_band(found: PowerExpectationResult, due: BoolArray, epoch: MonitoredEpoch) -> MonitorOutput:
+    """The same where both bands are corrected: power is of the band, and what L5 fails is not used there alone."""
+    inputs, params = epoch.inputs, epoch.inputs.station.expected_power
+    test, key = EXPECTED_POWER.test("satellite"), EXPECTED_POWER.key("satellite")
+    said: list[SecondBandOutput] = []
+    for band in (L1, L5):
+        place = params.bands.index(band)
+        result = _of_band(found.satellites, np.s_[place])
+        measured = due if band == L1 else due & np.isfinite(result.statistic)
+        summary = summarise(result, measured, signal_of((band,)))
+        channels = _of_band(found.channels, np.s_[:, place])
+        of_channels = (Verdict(test.cause, channels),) if params.exclude and channels.failed.any() else ()
+        said.append(SecondBandOutput(
+            summaries={key: summary}, satellites=verdicts(params.exclude, test.cause, result, inputs.due),
+            channels=of_channels,
+        ))  # fmt: skip
+    first, second = said
+    return MonitorOutput(summaries=first.summaries, satellites=first.satellites, channels=first.channels, second=second)
+
+
+def _of_band(result: MonitorResult, place: Any) -> MonitorResult:
+    """What a result says at a place of its axes."""
+    threshold = np.broadcast_to(result.threshold, result.statistic.shape)
+    return MonitorResult(statistic=result.statistic[place], threshold=threshold[place], failed=result.failed[place])
 
 
 MONITOR: Final = SignalMonitor(entry=EXPECTED_POWER, parameters=PowerExpectationParams, initial=_initial, step=_step)

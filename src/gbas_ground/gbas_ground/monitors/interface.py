@@ -158,6 +158,24 @@ class Verdict(NamedTuple):
     power: int = 0
 
 
+class SecondBandOutput(NamedTuple):
+    """What a monitor says of the second band where the first must not pay for it.
+
+    Attributes
+    ----------
+    summaries : mapping from the numbers of a test to MonitorSummary
+    satellites, channels : tuple of Verdict
+        Whose corrections of that band must not be used, and why.
+    ready : (N,) bool array or None
+        Satellites it could judge, where that is required.
+    """
+
+    summaries: Summaries
+    satellites: tuple[Verdict, ...] = ()
+    channels: tuple[Verdict, ...] = ()
+    ready: BoolArray | None = None
+
+
 class MonitorOutput(NamedTuple):
     """What a monitor has to say.
 
@@ -169,6 +187,8 @@ class MonitorOutput(NamedTuple):
         What follows from it; nothing from a monitor that is only watched.
     ready : (N,) bool array or None
         Satellites it could judge, where that is required.
+    second : SecondBandOutput or None
+        The same of the second band alone, of a station that corrects it.
     """
 
     summaries: Summaries
@@ -176,6 +196,7 @@ class MonitorOutput(NamedTuple):
     satellites: tuple[Verdict, ...] = ()
     channels: tuple[Verdict, ...] = ()
     ready: BoolArray | None = None
+    second: SecondBandOutput | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

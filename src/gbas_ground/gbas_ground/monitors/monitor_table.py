@@ -36,6 +36,7 @@ class MonitorSummary(NamedTuple):
 Summaries = Mapping[TestKey, MonitorSummary]
 """By the numbers of monitor and test; a test that is missing is not due."""
 
+_NO_SUMMARIES: Final[Summaries] = {}
 _SIGNAL_OF_BAND: Final = {L1: Signal.L1, L2: Signal.L2, L5: Signal.L5}
 
 
@@ -115,7 +116,9 @@ def _worst_of_each(result: MonitorResult, count: int) -> tuple[FloatArray, BoolA
     return worst, fails
 
 
-def monitor_epoch(gps_week: int, tow_s: float, summaries: Summaries, shown: BoolArray) -> MonitorEpoch:
+def monitor_epoch(
+    gps_week: int, tow_s: float, summaries: Summaries, shown: BoolArray, further: Summaries = _NO_SUMMARIES
+) -> MonitorEpoch:
     """The table of what all monitors said.
 
     Parameters
@@ -125,11 +128,15 @@ def monitor_epoch(gps_week: int, tow_s: float, summaries: Summaries, shown: Bool
     summaries : mapping
     shown : (N,) bool array
         Satellites that have rows.
+    further : mapping
+        The same of another signal.
     """
-    keys = tuple([key for key in TESTS if key in summaries])
-    if not keys:
+    said = [(key, summaries[key]) for key in TESTS if key in summaries]
+    said += [(key, further[key]) for key in TESTS if key in further]
+    if not said:
         return MonitorEpoch(gps_week=gps_week, tow_s=tow_s)
-    statistic, threshold, failed, due, signal = zip(*(summaries[key] for key in keys), strict=True)
+    keys = tuple([key for key, _ in said])
+    statistic, threshold, failed, due, signal = zip(*(summary for _, summary in said), strict=True)
     rows = monitor_rows(
         np.concatenate(statistic), np.concatenate(threshold), np.concatenate(failed), np.concatenate(due), shown,
         _about(keys, signal), _SOURCE_ID,

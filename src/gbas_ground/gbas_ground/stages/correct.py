@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -17,14 +18,17 @@ from gbas_ground.consistency import (
     Corrections,
     Exclusions,
     Finding,
+    SeenToPass,
     readmission_state,
     resolve_consistency,
 )
 from gbas_ground.corrections.formation import range_correction_m
+from gbas_ground.corrections.sigma import measured_sigma_m
 from gbas_ground.exclusions import advance
 from gbas_ground.long_term import monitor_sigmas
 from gbas_ground.monitors.monitor_table import Summaries
 from gbas_ground.monitors.sigma_monitor import SigmaMonitorState
+from gbas_ground.params import GroundParams
 from gbas_ground.prepared import PreparedStation
 from gbas_ground.stages.monitor import Monitored
 from gbas_ground.stages.track import Tracked
@@ -97,7 +101,7 @@ def correct(state: CorrectState, monitored: Monitored, station: PreparedStation)
         corrections=corrections,
         summaries={**checks.summaries(), **sigma_summaries},
         findings=(*monitored.findings, *of_corrections, *of_sigmas),
-        exclusions=_advanced(exclusions, inputs, corrections, checks, monitored, station),
+        exclusions=advanced(exclusions, inputs, corrections, checks, _seen(monitored, params), station),
     )
     return CorrectState(previous=_previous(tracked), sigmas=sigmas), corrected
 
@@ -124,15 +128,16 @@ def _correction_inputs(
     shape = tracked.correction_m.shape
     return CorrectionInputs(
         correction_m=tracked.correction_m,
-        previous_m=_previous_corrections(recent, received.known.current, received.changed, shape, station.site),
+        previous_m=previous_corrections(recent, received.known.current, received.changed, shape, station.site),
         dt_s=dt_s,
         settled=tracked.settled,
         judged=monitored.signals.ready,
         elevation_rad=tracked.predicted.elevation_rad,
+        sigma_m=measured_sigma_m(station.params, tracked.predicted.elevation_rad),
     )
 
 
-def _previous_corrections(
+def previous_corrections(
     previous: PreviousEpoch | None, current: Ephemeris, changed: BoolArray, shape: tuple[int, ...], site: Site
 ) -> FloatArray:
     """PR_sc of the epoch before, as today's ephemerides would have made it."""
@@ -145,26 +150,30 @@ def _previous_corrections(
     return np.where(changed, again, previous.correction_m)
 
 
-def _advanced(
+def _seen(monitored: Monitored, params: GroundParams) -> Callable[[], SeenToPass]:
+    """What the monitors of signals were seen to pass."""
+    signals = monitored.signals
+    return lambda: SeenToPass(
+        monitored.tracked.channel_ok, signals.receivers_quiet, signals.passed(params.monitors.readmission_share)
+    )
+
+
+def advanced(
     exclusions: Exclusions,
     inputs: CorrectionInputs,
     corrections: Corrections,
     checks: Checks,
-    monitored: Monitored,
+    seen: Callable[[], SeenToPass],
     station: PreparedStation,
 ) -> Exclusions:
-    """Count the clear time of everything that is excluded."""
+    """Count the clear time of everything that is excluded; what was seen is asked for only where anything is."""
     latches = (exclusions.channels, exclusions.receivers, exclusions.satellites)
     if not any(latch.remembers for latch in latches):
         return exclusions
-    params, signals, dt_s = station.params, monitored.signals, monitored.tracked.received.now.dt_s
-    satellite_ok = signals.passed(params.monitors.readmission_share)
-    channel_ok = monitored.tracked.channel_ok
-    passed = readmission_state(
-        inputs, corrections, checks, exclusions, channel_ok, signals.receivers_quiet, satellite_ok, station
-    )
+    max_gap_s = station.params.smoothing.max_gap_s
+    passed = readmission_state(inputs, corrections, checks, exclusions, seen(), station)
     return Exclusions(
-        channels=advance(exclusions.channels, passed.channels, dt_s, params.smoothing.max_gap_s),
-        receivers=advance(exclusions.receivers, passed.receivers, dt_s, params.smoothing.max_gap_s),
-        satellites=advance(exclusions.satellites, passed.satellites, dt_s, params.smoothing.max_gap_s),
+        channels=advance(exclusions.channels, passed.channels, inputs.dt_s, max_gap_s),
+        receivers=advance(exclusions.receivers, passed.receivers, inputs.dt_s, max_gap_s),
+        satellites=advance(exclusions.satellites, passed.satellites, inputs.dt_s, max_gap_s),
     )

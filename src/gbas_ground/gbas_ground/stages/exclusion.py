@@ -17,8 +17,8 @@ from gbas_msgs_py.codes import EventKind, ExclusionCause
 from gbas_msgs_py.events import EventLog
 
 
-def released(exclusions: Exclusions, params: GroundParams, events: EventLog) -> Exclusions:
-    """End what has been clear for the re-admission time."""
+def released(exclusions: Exclusions, params: GroundParams, events: EventLog, of: str = "") -> Exclusions:
+    """End what has been clear for the re-admission time; `of` is what the subjects of events end with."""
     times = params.monitors.readmission_time_s, params.monitors.readmission_longest_s
     channels, channels_ended = release(exclusions.channels, *times)
     receivers, receivers_ended = release(exclusions.receivers, *times)
@@ -26,23 +26,23 @@ def released(exclusions: Exclusions, params: GroundParams, events: EventLog) -> 
     for row in np.flatnonzero(receivers_ended):
         cause = ExclusionCause(int(exclusions.receivers.cause[row]))
         waited_s = max(params.monitors.readmission_time_s, float(exclusions.receivers.wait_s[row]))
-        events.add(EventKind.READMISSION, f"rr{row + 1}", cause.word, waited_s)
+        events.add(EventKind.READMISSION, f"rr{row + 1}{of}", cause.word, waited_s)
     for row, satellite in np.argwhere(channels_ended) if channels_ended.any() else ():
         cause = ExclusionCause(int(exclusions.channels.cause[row, satellite]))
         waited_s = max(params.monitors.readmission_time_s, float(exclusions.channels.wait_s[row, satellite]))
-        events.add(EventKind.READMISSION, f"rr{row + 1}/{SAT_IDS[satellite]}", cause.word, waited_s)
+        events.add(EventKind.READMISSION, f"rr{row + 1}/{SAT_IDS[satellite]}{of}", cause.word, waited_s)
     return Exclusions(channels=channels, receivers=receivers, satellites=satellites)
 
 
-def exclude_channels(exclusions: Exclusions, checks: Iterable[Verdict], events: EventLog) -> Exclusions:
-    """Exclude the channels that fail, each with an event."""
+def exclude_channels(exclusions: Exclusions, checks: Iterable[Verdict], events: EventLog, of: str = "") -> Exclusions:
+    """Exclude the channels that fail, each with an event; `of` is what its subject ends with."""
     channels = exclusions.channels
     for cause, check, _ in checks:
         if not check.failed.any():
             continue
         for row, satellite in np.argwhere(check.failed & ~channels.excluded):
             value, threshold = check.at(row, satellite)
-            events.add(EventKind.EXCLUSION, f"rr{row + 1}/{SAT_IDS[satellite]}", cause.word, value, threshold)
+            events.add(EventKind.EXCLUSION, f"rr{row + 1}/{SAT_IDS[satellite]}{of}", cause.word, value, threshold)
         channels = exclude(channels, check.failed, cause)
     return replace(exclusions, channels=channels)
 

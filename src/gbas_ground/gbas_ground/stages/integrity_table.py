@@ -4,14 +4,20 @@ from __future__ import annotations
 
 from typing import Final
 
+import numpy as np
+
 from gbas_core.record import BoolArray
+from gbas_ground.corrections.second_band import SecondBandSettings
 from gbas_ground.params import GroundParams
 from gbas_ground.stages.decide import Decided
 from gbas_ground.stages.kernels.integrity import claims_of_usable, corrections_of_usable, rows_of
-from gbas_msgs_py.products import PRODUCTS
+from gbas_ground.stages.second_band import SecondBand
+from gbas_msgs_py.products import L1_30, L1_100, PRODUCTS
 from gbas_msgs_py.records import MAX_REFERENCE_RECEIVERS, IntegrityEpoch
 
 _N_PRODUCTS: Final = len(PRODUCTS)
+OF_L1: Final = (L1_100, L1_30)
+"""Products of L1 in the order of the smoothing constants."""
 
 
 def integrity_of(decided: Decided, used: BoolArray, n_receivers: int, params: GroundParams) -> IntegrityEpoch:
@@ -57,3 +63,21 @@ def integrity_of(decided: Decided, used: BoolArray, n_receivers: int, params: Gr
         b_m=b_m,
         receiver_used=receiver_used,
     )
+
+
+def with_second_band(integrity: IntegrityEpoch, second: SecondBand, settings: SecondBandSettings) -> IntegrityEpoch:
+    """The record with the corrections of the second band too: those that are broadcast, where they are usable.
+
+    An orbit's error is the same on every band: P is that of the L1 correction of the same smoothing constant.
+    """
+    corrections, usable = second.corrections, second.usable
+    count = corrections.b_m.shape[1]
+    used = np.where(np.isfinite(integrity.state), np.where(usable, corrections.used, False), np.nan)
+    for place, constant in zip(settings.products, settings.constants, strict=True):
+        integrity.p_ephemeris[place] = np.where(usable, integrity.p_ephemeris[OF_L1[constant]], np.nan)
+        integrity.prc_m[place] = np.where(usable, corrections.prc_m[constant], np.nan)
+        integrity.rrc_mps[place] = np.where(usable, corrections.rrc_mps[constant], np.nan)
+        integrity.sigma_pr_gnd_m[place] = np.where(usable, second.sigmas_m[constant], np.nan)
+        integrity.b_m[place, :count] = np.where(usable, corrections.b_m[constant], np.nan)
+        integrity.receiver_used[place, :count] = used
+    return integrity

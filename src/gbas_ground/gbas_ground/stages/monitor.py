@@ -1,12 +1,13 @@
 """Monitor: what every monitor of signals says of the satellites, and what is excluded for it.
 
 A satellite that fails is excluded from both smoothing constants and all bands, and one that a required monitor cannot
-judge yet is not used yet.
+judge yet is not used yet. What a monitor says of the second band alone goes to the stage of that band
+(:mod:`~gbas_ground.stages.second_band`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -16,7 +17,7 @@ from gbas_core.record import BoolArray, FloatArray
 from gbas_core.signals import L1, SPEED_OF_LIGHT_MPS
 from gbas_ground.channels.predicted_ranges import predict_ranges
 from gbas_ground.consistency import Exclusions, Finding
-from gbas_ground.monitors.interface import MonitoredEpoch, MonitorInputs, MonitorOutput, Verdict
+from gbas_ground.monitors.interface import MonitoredEpoch, MonitorInputs, MonitorOutput, SecondBandOutput, Verdict
 from gbas_ground.monitors.kernels.ranges import looked_at
 from gbas_ground.monitors.monitor_table import Summaries
 from gbas_ground.monitors.registry import SIGNAL_MONITORS
@@ -60,6 +61,8 @@ class SignalFindings(NamedTuple):
         P that the ephemeris monitor supports [m/m].
     summaries : mapping from the numbers of a test to MonitorSummary
     details : mapping from a field of :class:`MonitorDetailEpoch` to its value
+    second : tuple of SecondBandOutput
+        What monitors said of the second band alone.
     """
 
     satellites: tuple[Verdict, ...]
@@ -70,18 +73,24 @@ class SignalFindings(NamedTuple):
     orbit_bound: FloatArray
     summaries: Summaries
     details: Mapping[str, Any]
+    second: tuple[SecondBandOutput, ...] = ()
 
     def passed(self, share: float) -> BoolArray:
         """Satellites that were judged, not failed, and are below `share` of every threshold, ``(N,)``.
 
         What is excluded just above a threshold must not come back just below it.
         """
-        passed = self.ready
-        for _, result, power in self.satellites:
-            passed = passed & ~result.failed
-            if power:
-                passed = passed & ~(result.statistic > share**power * result.threshold)
-        return passed
+        return below(self.ready, self.satellites, share)
+
+
+def below(ready: BoolArray, satellites: Iterable[Verdict], share: float) -> BoolArray:
+    """Those that are ready, not failed, and below a share of every threshold, ``(N,)``."""
+    passed = ready
+    for _, result, power in satellites:
+        passed = passed & ~result.failed
+        if power:
+            passed = passed & ~(result.statistic > share**power * result.threshold)
+    return passed
 
 
 class Monitored(NamedTuple):
@@ -136,6 +145,7 @@ def run_monitors(memories: tuple[Any, ...], inputs: MonitorInputs) -> tuple[tupl
         orbit_bound=epoch.orbit_bound,
         summaries={key: each for output in outputs for key, each in output.summaries.items()},
         details={name: each for output in outputs for name, each in output.details.items()},
+        second=tuple(output.second for output in outputs if output.second is not None),
     )
 
 

@@ -15,6 +15,8 @@ from gbas_ground.channels.kernels.channels import compare, finish
 from gbas_ground.channels.predicted_ranges import predict_ranges
 from gbas_ground.channels.tracking import RawEpoch, TrackGroup, Tracks, track
 from gbas_ground.consistency import Exclusions
+from gbas_ground.corrections.formation import range_correction_m
+from gbas_ground.corrections.second_band import BAND
 from gbas_ground.monitors.expected_range import check_expected_range
 from gbas_ground.monitors.interface import Verdict
 from gbas_ground.monitors.monitor_table import Summaries, summarise
@@ -27,8 +29,9 @@ from gbas_ground.stages.receive import Received
 from gbas_msgs_py.codes import ExclusionCause
 from gbas_msgs_py.monitors import EXPECTED_RANGE, SIGNAL_POWER, TESTS
 
-_CHECKS: Final = (EXPECTED_RANGE.key("residual"), SIGNAL_POWER.key("cn0"))
+CHECKS: Final = (EXPECTED_RANGE.key("residual"), SIGNAL_POWER.key("cn0"))
 """Tests of single channels, in their order."""
+_EVERY_BAND: Final = slice(None)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -54,6 +57,8 @@ class Tracked(NamedTuple):
         PR_sc [m].
     summaries : mapping from the numbers of a test to MonitorSummary
     exclusions : Exclusions
+    second_range : Verdict or None
+        Of the second band's raw codes, of a station that corrects it.
     """
 
     received: Received
@@ -66,6 +71,7 @@ class Tracked(NamedTuple):
     correction_m: FloatArray
     summaries: Summaries
     exclusions: Exclusions
+    second_range: Verdict | None = None
 
 
 def track_channels(state: TrackState, received: Received, station: PreparedStation) -> tuple[TrackState, Tracked]:
@@ -81,6 +87,9 @@ def track_channels(state: TrackState, received: Received, station: PreparedStati
     far = _far_receivers(checks[0].result, params)
     exclusions = exclude_receivers(exclusions, far, ExclusionCause.RECEIVER_FAULT, now.events)
     clean = _without(raw, checks[0].result.failed)
+    second_range = None if station.second is None else _second_range(raw, predicted, params)
+    if second_range is not None:
+        clean = _without(clean, second_range.result.failed, BAND)
     groups, tracks = track(state.groups, clean, now.epoch_ms, known_m, station.filters)
     smoothed_correction_m, settled = finish(
         tracks.smoothed_m, tracks.age_s, tracks.bands.index(L1), predicted.range_m, predicted.clock_s,
@@ -95,8 +104,9 @@ def track_channels(state: TrackState, received: Received, station: PreparedStati
         settled=settled,
         tracks=tracks,
         correction_m=smoothed_correction_m,
-        summaries={key: summarise(check.result, tracked) for key, check in zip(_CHECKS, checks, strict=True)},
+        summaries={key: summarise(check.result, tracked) for key, check in zip(CHECKS, checks, strict=True)},
         exclusions=exclusions,
+        second_range=second_range,
     )
 
 
@@ -108,7 +118,17 @@ def _channel_checks(
     power = check_signal_power(
         raw.cn0_dbhz[:, L1], tracked, params.signal_power.min_cn0_dbhz, required=params.signal_power.require_cn0
     )
-    return tuple(Verdict(TESTS[key][1].cause, result) for key, result in zip(_CHECKS, (residual, power), strict=True))
+    return tuple(Verdict(TESTS[key][1].cause, result) for key, result in zip(CHECKS, (residual, power), strict=True))
+
+
+def _second_range(raw: RawEpoch, predicted: PredictedRanges, params: GroundParams) -> Verdict:
+    """Raw codes of the second band against the expected ranges; the satellite clock is that of L1, as the corrections
+    of every band have it."""
+    code_m = raw.code_m[:, BAND]
+    comparable = np.isfinite(code_m + raw.carrier_m[:, BAND] + predicted.clock_s)
+    correction_m = range_correction_m(predicted.range_m, code_m, predicted.clock_s)
+    result = check_expected_range(correction_m, comparable, params.expected_range.max_residual_m)
+    return Verdict(TESTS[CHECKS[0]][1].cause, result)
 
 
 def _passing(tracked: BoolArray, checks: tuple[Verdict, ...]) -> BoolArray:
@@ -131,8 +151,10 @@ def _far_receivers(residual: MonitorResult, params: GroundParams) -> MonitorResu
     )
 
 
-def _without(raw: RawEpoch, failed: BoolArray) -> RawEpoch:
-    """Raw observations without those that must not enter a filter."""
+def _without(raw: RawEpoch, failed: BoolArray, bands: int | slice = _EVERY_BAND) -> RawEpoch:
+    """Raw observations without the codes that must not enter a filter."""
     if not failed.any():
         return raw
-    return raw._replace(code_m=np.where(failed[:, np.newaxis, :], np.nan, raw.code_m))
+    code_m = raw.code_m.copy()
+    code_m[:, bands] = np.where(failed if isinstance(bands, int) else failed[:, np.newaxis], np.nan, code_m[:, bands])
+    return raw._replace(code_m=code_m)

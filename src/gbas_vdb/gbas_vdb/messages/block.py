@@ -28,6 +28,7 @@ _TYPE_NUMBERS: Final[dict[type, int]] = {
     m.Type3: 3,
     m.Type4: 4,
     m.Type5: 5,
+    m.Type8: tables.PRIVATE_TYPE,
     m.Type11: 11,
 }
 
@@ -236,7 +237,8 @@ def decode_body(message_type: int, body: bytes) -> tuple[m.Message, tuple[str, .
         return m.Type3(n_fill_bytes=len(body)), ()
     if message_type == 4:
         return _decode_type4(body)
-    if message_type not in tables.WHOLE_MESSAGES:
+    of_others = message_type == tables.PRIVATE_TYPE and not body.startswith(tables.PRIVATE_BEGIN)
+    if message_type not in tables.WHOLE_MESSAGES or of_others:
         return m.UnknownMessage(message_type=message_type, body=body), (f"message type {message_type} is not known",)
     message: m.Message = decode(tables.WHOLE_MESSAGES[message_type], reader)
     _refuse_rest(reader)

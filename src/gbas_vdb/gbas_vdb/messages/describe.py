@@ -264,7 +264,7 @@ def message_of(message_type: int, document: Any, path: str = "fields") -> m.Mess
         return m.Type4(
             data_sets=tuple(_data_set_of(item, where) for item, where in _items(document, "data_sets", path))
         )
-    if message_type not in tables.WHOLE_MESSAGES:
+    if message_type not in tables.WHOLE_MESSAGES or "body_hex" in document:
         return m.UnknownMessage(message_type=message_type, body=_bytes_at(document, "body_hex", path))
     message: m.Message = _from_plain(tables.WHOLE_MESSAGES[message_type], document, path)
     return message

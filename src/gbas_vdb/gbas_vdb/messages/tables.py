@@ -14,6 +14,7 @@ from typing import Final
 from gbas_vdb.messages.fields import Choice, Count, Number, Spare, Text, Vector
 from gbas_vdb.messages.layout import Group, Layout
 from gbas_vdb.messages.types import (
+    PRIVATE_FORMAT,
     AdditionalBlock1,
     AdditionalBlock3,
     AdditionalBlock4,
@@ -24,6 +25,7 @@ from gbas_vdb.messages.types import (
     Type1,
     Type2,
     Type5,
+    Type8,
     Type11,
 )
 
@@ -166,6 +168,28 @@ TYPE_11: Final = Layout(
         Group(name="measurements", layout=CORRECTION_30),
     ),
 )
+
+
+# Ours: test messages (type 8), which no receiver but our own looks into; see docs/conventions.md.
+TYPE_8: Final = Layout(
+    record=Type8,
+    entries=(
+        Number(
+            name="private_format",
+            bits=16,
+            minimum=PRIVATE_FORMAT,
+            maximum=PRIVATE_FORMAT,
+            doc="the bytes G5: this layout",
+        ),
+        _Z_COUNT,
+        _MESSAGE_FLAG,
+        _N_MEASUREMENTS,
+        Number(name="measurement_type", bits=3, doc="0 is L5/E5a smoothed over 100 s, 1 over 30 s"),
+        Group(name="measurements", layout=CORRECTION_100),
+    ),
+)
+PRIVATE_TYPE: Final = 8
+PRIVATE_BEGIN: Final = PRIVATE_FORMAT.to_bytes(2, "little")
 
 
 def latitude(name: str) -> Number:
@@ -323,10 +347,12 @@ TYPE_5: Final = Layout(
 )
 
 # Messages that one table describes; types 2 and 4 have tails with lengths of their own.
-WHOLE_MESSAGES: Final[dict[int, Layout]] = {1: TYPE_1, 5: TYPE_5, 11: TYPE_11}
+WHOLE_MESSAGES: Final[dict[int, Layout]] = {1: TYPE_1, 5: TYPE_5, 8: TYPE_8, 11: TYPE_11}
 
 # Messages with corrections, and the layout of one ranging source in each.
 CORRECTION_ENTRIES: Final[dict[int, Layout]] = {1: CORRECTION_100, 11: CORRECTION_30}
+# The same of corrections in messages of ours, by measurement type.
+PRIVATE_ENTRIES: Final[dict[int, Layout]] = {0: CORRECTION_100, 1: CORRECTION_100}
 
 # Of the header; the message block identifier and the length are in block.py.
 STATION_ID: Final = Text(name="station_id", characters=4, bits_per_character=6, doc="GBAS identification")

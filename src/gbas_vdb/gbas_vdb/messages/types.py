@@ -73,6 +73,25 @@ class Type11:
     measurements: tuple[Correction30, ...] = ()
 
 
+PRIVATE_FORMAT: int = 0x3547
+"""How our private test messages begin: the bytes ``G5``; another layout would begin otherwise."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Type8:
+    """Pseudorange corrections of a second frequency, in a private test message: the standard has no message for them.
+
+    `measurement_type` 0 is L5/E5a smoothed over 100 s, 1 over 30 s. Z-count, message flag and measurements are those of
+    a type 1 message; issue of data, CRC and P of the ephemeris are told there.
+    """
+
+    private_format: int = PRIVATE_FORMAT
+    modified_z_count_s: float
+    additional_message_flag: int = 0
+    measurement_type: int = 0
+    measurements: tuple[Correction100, ...] = ()
+
+
 @dataclass(frozen=True, kw_only=True, slots=True)
 class AdditionalBlock1:
     """Positioning service and ephemeris missed detection parameters; `d_max_m` is infinite when not limited."""
@@ -235,4 +254,4 @@ class UnknownMessage:
     body: bytes
 
 
-Message = Type1 | Type2 | Type3 | Type4 | Type5 | Type11 | UnknownMessage
+Message = Type1 | Type2 | Type3 | Type4 | Type5 | Type8 | Type11 | UnknownMessage

@@ -166,12 +166,16 @@ def no_correction(number: int, kind: int) -> str:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Frame:
-    """What a station has to say in one frame; the epoch of the corrections is the start of the frame."""
+    """What a station has to say in one frame; the epoch of the corrections is the start of the frame.
+
+    `further` are corrections in messages of ours, by their measurement type, of those sources that have them.
+    """
 
     gps_week: int
     tow_s: float
     sources: Sources
     station: Type2
+    further: Mapping[int, Items] = field(default_factory=dict)
     approaches: tuple[FasDataSet | UnknownDataSet, ...] = ()
     predictions: Type5 | None = None
 

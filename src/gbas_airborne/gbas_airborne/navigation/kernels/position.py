@@ -16,26 +16,25 @@ from gbas_core.compiled import compiled
 from gbas_core.gnss.kernels.frames import azimuth_elevation, fill_enu, geodetic
 from gbas_core.gnss.kernels.orbits import rotated_range
 from gbas_core.models import error_models as model
-from gbas_core.models.error_models import AIRFRAME_MULTIPATH, EDGE_DEG
+from gbas_core.models.error_models import EDGE_DEG
 from gbas_core.positioning.kernels.wls import project
+from gbas_core.record import FloatArray
 from gbas_msgs_py.codes import Rejection
 
 RANGE, AZIMUTH, ELEVATION, TROPO, SIGMA_AIR, SIGMA_TROPO, SIGMA_IONO, SIGMA, INNOVATION, RESIDUAL, RANGE_ERROR = range(
     11
 )
 ROWS: Final = 11
-"""Rows of the sky: range, directions, tropospheric correction, sigmas of parts and all, corrected range less that
-predicted where the last step began and less its estimate, error of a satellite that the range test excluded.
+"""Rows of the sky: range, directions, tropospheric correction, sigmas of parts for levels and of all for weights,
+corrected range less that predicted where the last step began and less its estimate, error of a satellite that the range
+test excluded.
 """
 CONVERGED_M: Final = 0.05
 """A last step below this leaves an error far below a millimetre: what depends on the position (troposphere, lines of
 sight) changes by less than a hundredth of the step."""
 _LEAST_REDUNDANCY: Final = 1e-6
-_MULTIPATH_A0_M, _MULTIPATH_A1_M, _MULTIPATH_THETA0_DEG = (
-    AIRFRAME_MULTIPATH.a0_m,
-    AIRFRAME_MULTIPATH.a1_m,
-    AIRFRAME_MULTIPATH.theta0_deg,
-)
+LEVELS, WEIGHTS = range(2)
+"""Families of sigmas."""
 _NONE, _DISTANCE, _SIGMA = int(Rejection.NONE), int(Rejection.DISTANCE), int(Rejection.SIGMA)
 _ELEVATION, _RANGE_TEST = int(Rejection.ELEVATION), int(Rejection.RANGE_TEST)
 
@@ -45,14 +44,10 @@ class Conditions(NamedTuple):
 
     height_m: float
     d_max_m: float
-    sigma_vig: float
     refractivity: float
     refractivity_uncertainty: float
     scale_height_m: float
     mask_rad: float
-    noise_a0_m: float
-    noise_a1_m: float
-    noise_theta0_deg: float
     assumed_mps: float
     max_condition: float
     max_iterations: int
@@ -74,10 +69,51 @@ def own_speed_mps(position_m, previous_m, dt_s, up, assumed_mps):
     return np.sqrt(square) / dt_s
 
 
+class ErrorModel(NamedTuple):
+    """What a mode's sigmas are made of beside the corrections'.
+
+    Attributes
+    ----------
+    coefficient : (C,) array
+        Factors of the signals in the range; 0 for one that is not there.
+    curves : (2, groups, C, 6) array
+        Coefficients a0, a1 [m] and theta0 [deg] of airborne noise, and of multipath; for levels and for weights.
+    gradient : float
+        sigma_vig on L1 [m/m].
+    iono_factor, tau_s : float
+        Ionospheric delay over that on L1, and time constant of sigma_iono [s].
+    """
+
+    coefficient: FloatArray
+    curves: FloatArray
+    gradient: float
+    iono_factor: float
+    tau_s: float
+
+
+@compiled
+def air_sigma_m(theta_deg, coefficient, curves, noise_factor, s):
+    """Airborne noise and multipath of a range [m]; signals are independent.
+
+    Factors and curves of the signals ``(C,)``, ``(C, 6)``; factors on their sigmas ``(C, N)``.
+    """
+    total = 0.0
+    for c in range(coefficient.shape[0]):
+        if coefficient[c] == 0.0:
+            continue
+        a = curves[c]
+        own_m = np.hypot(model.curve_m(theta_deg, a[0], a[1], a[2]), model.curve_m(theta_deg, a[3], a[4], a[5]))
+        if coefficient[1] == 0.0:
+            return own_m * noise_factor[c, s]
+        total += (coefficient[c] * own_m * noise_factor[c, s]) ** 2
+    return np.sqrt(total)
+
+
 @compiled
 def look(
-    position_m, reference_m, satellite_m, noise_factor, sigma_gnd_m, previous_m, dt_s, tau_s, given, sky, los, rot
-):
+    position_m, reference_m, satellite_m, noise_factor, sigma_gnd_m, previous_m, dt_s, models, group, given, sky, los,
+    rot,
+):  # fmt: skip
     """Fill in the sky at a position, lines of sight ``(3, N)`` and local axes; returns the distance to the station."""
     latitude, longitude, height_m = geodetic(position_m[0], position_m[1], position_m[2])
     fill_enu(latitude, longitude, rot)
@@ -87,10 +123,13 @@ def look(
     distance_m, above_m = np.sqrt(square), height_m - given.height_m
     speed_mps = own_speed_mps(position_m, previous_m, dt_s, rot[2], given.assumed_mps)
     scale_m = given.scale_height_m if given.scale_height_m > 0.0 else np.nan
-    known = given.sigma_vig >= 0.0 and distance_m >= 0.0 and speed_mps >= 0.0 and tau_s >= 0.0
-    gradient = given.sigma_vig if known else np.nan
+    known = models.gradient >= 0.0 and distance_m >= 0.0 and speed_mps >= 0.0 and models.tau_s >= 0.0
+    gradient = models.gradient if known else np.nan
     for s in range(satellite_m.shape[1]):
         sky[:, s] = np.nan
+        if np.isnan(satellite_m[0, s]):
+            los[0, s] = los[1, s] = los[2, s] = np.nan
+            continue
         range_m, x, y, z = rotated_range(position_m, satellite_m[0, s], satellite_m[1, s], satellite_m[2, s])
         los[0, s], los[1, s], los[2, s] = x, y, z
         azimuth, elevation = azimuth_elevation(rot, x, y, z)
@@ -98,15 +137,19 @@ def look(
         theta_deg = np.rad2deg(elevation)
         if not theta_deg >= np.rad2deg(given.mask_rad) - EDGE_DEG:
             continue
-        noise_m = model.curve_m(theta_deg, given.noise_a0_m, given.noise_a1_m, given.noise_theta0_deg)
-        multipath_m = model.curve_m(theta_deg, _MULTIPATH_A0_M, _MULTIPATH_A1_M, _MULTIPATH_THETA0_DEG)
-        air_m = np.hypot(noise_m, multipath_m) * noise_factor[s]
+        curves = models.curves[:, group[s]]
+        air_m = air_sigma_m(theta_deg, models.coefficient, curves[LEVELS], noise_factor[LEVELS], s)
+        air_weight_m = air_sigma_m(theta_deg, models.coefficient, curves[WEIGHTS], noise_factor[WEIGHTS], s)
         sine = np.sin(np.deg2rad(theta_deg))
         tropo_m = abs(model.tropo_m(given.refractivity_uncertainty, scale_m, sine, above_m))
-        iono_m = model.iono_m(model.obliquity(np.deg2rad(theta_deg)), gradient, distance_m, speed_mps, tau_s)
+        iono_m = models.iono_factor * model.iono_m(
+            model.obliquity(np.deg2rad(theta_deg)), gradient, distance_m, speed_mps, models.tau_s
+        )
         sky[TROPO, s] = model.tropo_m(given.refractivity, scale_m, sine, above_m)
         sky[SIGMA_AIR, s], sky[SIGMA_TROPO, s], sky[SIGMA_IONO, s] = air_m, tropo_m, iono_m
-        sky[SIGMA, s] = np.sqrt(sigma_gnd_m[s] ** 2 + air_m**2 + tropo_m**2 + iono_m**2)
+        weight_m = np.sqrt(sigma_gnd_m[WEIGHTS, s] ** 2 + air_weight_m**2 + tropo_m**2 + iono_m**2)
+        # what the levels lack, the weights lack
+        sky[SIGMA, s] = weight_m if np.isfinite(sigma_gnd_m[LEVELS, s] + air_m) else np.nan
     return distance_m
 
 
@@ -185,7 +228,7 @@ def find_worst(reason, sky, los, group, projection, change_m, given):
 
 @compiled
 def solve(
-    position_m, source_reason, range_m, satellite_m, noise_factor, sigma_gnd_m, reference_m, previous_m, dt_s, tau_s,
+    position_m, source_reason, range_m, satellite_m, noise_factor, sigma_gnd_m, reference_m, previous_m, dt_s, models,
     rot_approach, group, given, reason, sky, projection, change_m, los,
 ):  # fmt: skip
     """Position of one mode without a range test, in ``position_m`` (the last one when there is none); whether there is
@@ -197,8 +240,8 @@ def solve(
     distance_m = np.nan
     for _ in range(given.max_iterations):
         distance_m = look(
-            position_m, reference_m, satellite_m, noise_factor, sigma_gnd_m, previous_m, dt_s, tau_s, given, sky,
-            los_ecef, rot_enu,
+            position_m, reference_m, satellite_m, noise_factor, sigma_gnd_m, previous_m, dt_s, models, group,
+            given, sky, los_ecef, rot_enu,
         )  # fmt: skip
         add_reasons(source_reason, range_m, sky, distance_m, given, reason)
         if np.isnan(rot_approach[0, 0]):
@@ -218,8 +261,8 @@ def solve(
 
 @compiled
 def tested_positions(
-    start_m, source_reason, range_m, satellite_m, noise_factor, sigma_gnd_m, reference_m, previous_m, dt_s, tau_s,
-    rot_approach, group, n_groups, given,
+    start_m, source_reason, range_m, satellite_m, noise_factor, sigma_gnd_m, reference_m, previous_m, dt_s, coefficient,
+    curves, iono, rot_approach, group, n_groups, given,
 ):  # fmt: skip
     """Positions without the satellites that fail the range test.
 
@@ -232,11 +275,15 @@ def tested_positions(
         Where to start; the last position, NaN if it cannot tell the speed [m].
     source_reason : (M, N) int array
         Why a satellite cannot be used; NONE where it can.
-    range_m, noise_factor, sigma_gnd_m : (M, N) arrays
+    range_m : (M, N) array
+    noise_factor, sigma_gnd_m : (M, 2, C, N), (M, 2, N) arrays
+        Of levels and weights.
     satellite_m : (M, 3, N) array
     reference_m : (3,) array
-    dt_s, tau_s : (M,) arrays
-        Time since the previous position; smoothing [s].
+    dt_s : (M,) array
+        Time since the previous position [s].
+    coefficient, curves, iono : (M, C), (M, 2, groups, C, 6), (M, 3) arrays
+        Fields of :class:`ErrorModel`, the last three of them in ``iono``.
     rot_approach : (3, 3) array
     group : (N,) int array
         Clock of each satellite.
@@ -260,13 +307,14 @@ def tested_positions(
     projection, clock_m = np.empty((n_modes, 3 + n_groups, n_sats)), np.full((n_modes, n_groups), np.nan)
     change_m, los = np.empty(3 + n_groups), np.empty((3, n_sats))
     for m in range(n_modes):
+        models = ErrorModel(coefficient[m], curves[m], iono[m, 0], iono[m, 1], iono[m, 2])
         sources, errors_m = source_reason[m].copy(), np.full(n_sats, np.nan)
         excluded = np.count_nonzero(sources == _RANGE_TEST)
         while True:
             position_m[m] = start_m[m]
             found[m], distance_m[m] = solve(
                 position_m[m], sources, range_m[m], satellite_m[m], noise_factor[m], sigma_gnd_m[m], reference_m,
-                previous_m[m], dt_s[m], tau_s[m], rot_approach, group, given, reason[m], sky[m], projection[m],
+                previous_m[m], dt_s[m], models, rot_approach, group, given, reason[m], sky[m], projection[m],
                 change_m, los,
             )  # fmt: skip
             if not found[m]:

@@ -19,8 +19,6 @@ from gbas_core.gnss.kernels.orbits import transmit_place
 from gbas_core.signals import L1, SPEED_OF_LIGHT_MPS
 from gbas_msgs_py.codes import Rejection
 
-MODEL_TAU_S: Final = 100.0
-"""The airborne sigma models are those of code smoothed over this time."""
 _YOUNGEST_S: Final = 0.5  # a filter is never taken to be younger than one epoch of the VDB's rate
 _OWN_IOD: Final = FIELDS.index("iod")
 
@@ -45,16 +43,16 @@ def corrected_range_m(smoothed_m, prc_m, rrc_mps, age_s, satellite_clock_s):
 
 
 @compiled
-def settling_factor(settled_s, tau_s):
-    """Noise left by a carrier smoothing filter over that of the settled 100 s filter of the sigma models [-].
+def settling_factor(settled_s, tau_s, model_tau_s):
+    """Noise left by a carrier smoothing filter over that of the settled filter of the sigma models [-].
 
-    Time since the filter's start and time constant [s].
+    Time since the filter's start, time constant, and that of the models [s].
 
     Notes
     -----
     White code noise of variance v per second: the mean over t < tau leaves v/t; the settled filter v/(2 tau); between
-    them the start decays with exp(-2 (t - tau)/tau). The factor is the root of the ratio to v/(2 100 s), never below
-    one. For tau = 100 s it is 1.41 at t = tau and within 1 % of one after 2.96 tau.
+    them the start decays with exp(-2 (t - tau)/tau). The factor is the root of the ratio to v/(2 model_tau), never
+    below one. For both of 100 s it is 1.41 at t = tau and within 1 % of one after 2.96 tau.
     """
     if np.isnan(settled_s):
         return np.nan
@@ -63,7 +61,7 @@ def settling_factor(settled_s, tau_s):
         variance = 1.0 / since_start
     else:
         variance = (1.0 + np.exp(-2.0 * (since_start - tau) / tau)) / (2.0 * tau)
-    return np.sqrt(max(variance * 2.0 * MODEL_TAU_S, 1.0))
+    return np.sqrt(max(variance * 2.0 * model_tau_s, 1.0))
 
 
 @compiled
@@ -132,45 +130,138 @@ def first_reason(s, tracked, systems, corrections, fresh, single, own, own_crc, 
 
 
 @compiled
+def combine(corrections, product, level_product, coefficient, s, applied):
+    """Fill in the correction of a mode's range of a satellite, and return the sigma of its weight.
+
+    Rows are those of a set of corrections; sigmas are independent between signals. B values are combined where the same
+    receivers are behind both signals; elsewhere they are missing.
+
+    Source: Circiu et al., eq (3) and (7).
+    """
+    first = product[0]
+    if coefficient[1] == 0.0:
+        for row in range(corrections.shape[1]):
+            applied[row, s] = corrections[first, row, s]
+        applied[SIGMA, s] = corrections[level_product[0], SIGMA, s]
+        return corrections[first, SIGMA, s]
+    applied[LISTED, s], applied[IOD, s] = corrections[first, LISTED, s], corrections[first, IOD, s]
+    second = product[1]
+    for row in range(PRC, corrections.shape[1]):
+        if row != SIGMA:
+            total = coefficient[0] * corrections[first, row, s] + coefficient[1] * corrections[second, row, s]
+            applied[row, s] = total
+    level = weight = 0.0
+    for c in range(2):
+        level += (coefficient[c] * corrections[level_product[c], SIGMA, s]) ** 2
+        weight += (coefficient[c] * corrections[product[c], SIGMA, s]) ** 2
+    applied[SIGMA, s] = np.sqrt(level)
+    return np.sqrt(weight)
+
+
+@compiled
+def agree(corrections, first, second, s):
+    """Whether the corrections of two signals are of one ephemeris and of the same receivers."""
+    if corrections[first, IOD, s] != corrections[second, IOD, s]:
+        return False
+    for row in range(B_VALUES, corrections.shape[1]):
+        if np.isfinite(corrections[first, row, s]) != np.isfinite(corrections[second, row, s]):
+            return False
+    return True
+
+
+@compiled
+def places(measured, product, own, gps_week, tow_s):
+    """Satellite positions ``(P, 3, N)`` and clocks ``(P, N)`` for sets of corrections, by raw code of their signals.
+
+    Arguments as of :func:`correct_ranges`; a product is of one signal, so any mode that applies it has its code.
+    """
+    n_products, n_sats = own.shape[0], own.shape[2]
+    at_m, clock_s = np.full((n_products, 3, n_sats), np.nan), np.full((n_products, n_sats), np.nan)
+    done = np.zeros(n_products, np.bool_)
+    for m in range(product.shape[0]):
+        for c in range(product.shape[1]):
+            p = product[m, c]
+            if done[p]:
+                continue
+            done[p] = True
+            for s in range(n_sats):
+                code_m = measured[m, c, 0, s]
+                if np.isfinite(code_m + own[p, _OWN_IOD, s]):
+                    x, y, z, clock_s[p, s] = transmit_place(own[p], s, gps_week, tow_s, code_m, L1)
+                    at_m[p, 0, s], at_m[p, 1, s], at_m[p, 2, s] = x, y, z
+    return at_m, clock_s
+
+
+@compiled
 def correct_ranges(
-    measured, tau_s, product, corrections, age_s, own, own_crc, checks, systems, gps_week, tow_s, n_receivers,
-    timeout_s, settle_s, inflate,
+    measured, coefficient, tau_s, level_tau_s, model_tau_s, product, level_product, corrections, age_s, own, own_crc,
+    checks, systems, gps_week, tow_s, n_receivers, timeout_s, settle_s, inflate,
 ):  # fmt: skip
-    """Reasons ``(M, N)``, corrected ranges and factors on airborne noise ``(M, N)``, satellite positions ``(M, 3, N)``.
+    """Reasons, corrected ranges and sigmas of weights ``(M, N)``, corrections as applied ``(M, rows, N)``, satellite
+    positions ``(M, 3, N)``, and factors on airborne noise for levels and for weights ``(M, 2, C, N)``.
+
+    A mode's range is a sum over at most C = 2 signals of the corrected ranges times a factor.
 
     Parameters
     ----------
-    measured : (M, 3, N) array
+    measured : (M, C, 3, N) array
         Raw and smoothed code [m], age of the filter [s].
-    tau_s, product : (M,) arrays
-        Time constant [s]; which of the P sets of corrections.
+    coefficient : (M, C) array
+        Factors; 0 for a signal that is not there.
+    tau_s, level_tau_s : (M,) arrays
+        Time constant of the ranges, and the one the levels' sigmas are for [s].
+    model_tau_s : (M, 2, C) array
+        Time constant the airborne sigma models of levels and of weights are for [s].
+    product, level_product : (M, C) arrays
+        Which of the P sets of corrections is applied, and which has the sigma of the levels.
     corrections, age_s : (P, rows, N), (P,) arrays
         Sets of corrections and their ages [s].
     own, own_crc : (P, fields, N), (P, N) arrays
         Own ephemerides with the issue of data of the corrections, and their CRCs.
     checks : (3, N) array
         Issue of data, CRC and P as the station sent them.
-    systems : (N,) bool array
+    systems : (M, N) bool array
+
+    Notes
+    -----
+    The satellite clock is that of L1 for every signal, with the group delay, as it is at the station: what is left on
+    another signal is the same at both ends.
     """
-    n_modes, _, n_sats = measured.shape
+    n_modes, n_signals, _, n_sats = measured.shape
     reason = np.empty((n_modes, n_sats), np.int64)
-    ranges_m, factor = np.full((n_modes, n_sats), np.nan), np.ones((n_modes, n_sats))
+    ranges_m, weight_sigma_m = np.full((n_modes, n_sats), np.nan), np.full((n_modes, n_sats), np.nan)
+    factor = np.ones((n_modes, 2, n_signals, n_sats))
     place_m = np.full((n_modes, 3, n_sats), np.nan)
+    applied = np.full((n_modes, corrections.shape[1], n_sats), np.nan)
+    single = np.zeros(corrections.shape[0], np.bool_)
+    for p in range(corrections.shape[0]):
+        single[p] = single_receiver(corrections[p], n_receivers)
+    at_m, clock_s = places(measured, product, own, gps_week, tow_s)
     for m in range(n_modes):
-        p = product[m]
-        single, fresh = single_receiver(corrections[p], n_receivers), -timeout_s <= age_s[p] <= timeout_s
+        two = coefficient[m, 1] != 0.0
         for s in range(n_sats):
-            code_m, smoothed_m, since_s = measured[m, 0, s], measured[m, 1, s], measured[m, 2, s]
-            reason[m, s] = first_reason(
-                s, np.isfinite(smoothed_m), systems, corrections[p], fresh, single, own[p], own_crc[p], checks,
-                since_s >= settle_s,
-            )  # fmt: skip
-            if inflate:
-                factor[m, s] = settling_factor(since_s, tau_s[m])
-            if np.isfinite(code_m + own[p, _OWN_IOD, s]):
-                x, y, z, clock_s = transmit_place(own[p], s, gps_week, tow_s, code_m, L1)
-                place_m[m, 0, s], place_m[m, 1, s], place_m[m, 2, s] = x, y, z
-                ranges_m[m, s] = corrected_range_m(
-                    smoothed_m, corrections[p, PRC, s], corrections[p, RRC, s], age_s[p], clock_s
+            reason[m, s] = _NONE
+            total_m = 0.0
+            for c in range(2 if two else 1):
+                p, smoothed_m, since_s = product[m, c], measured[m, c, 1, s], measured[m, c, 2, s]
+                fresh = -timeout_s <= age_s[p] <= timeout_s
+                if reason[m, s] == _NONE:
+                    reason[m, s] = first_reason(
+                        s, np.isfinite(smoothed_m), systems[m], corrections[p], fresh, single[p], own[p], own_crc[p],
+                        checks, since_s >= settle_s,
+                    )  # fmt: skip
+                if reason[m, s] == _NONE and not np.isfinite(corrections[level_product[m, c], SIGMA, s]):
+                    reason[m, s] = _INVALID
+                if inflate:
+                    factor[m, 0, c, s] = settling_factor(since_s, level_tau_s[m], model_tau_s[m, 0, c])
+                    factor[m, 1, c, s] = settling_factor(since_s, tau_s[m], model_tau_s[m, 1, c])
+                range_m = corrected_range_m(
+                    smoothed_m, corrections[p, PRC, s], corrections[p, RRC, s], age_s[p], clock_s[p, s]
                 )
-    return reason, ranges_m, factor, place_m
+                total_m = total_m + coefficient[m, c] * range_m if two else range_m
+            place_m[m, :, s] = at_m[product[m, 0], :, s]
+            if two and reason[m, s] == _NONE and not agree(corrections, product[m, 0], product[m, 1], s):
+                reason[m, s] = _B_VALUES
+            ranges_m[m, s] = total_m
+            weight_sigma_m[m, s] = combine(corrections, product[m], level_product[m], coefficient[m], s, applied[m])
+    return reason, ranges_m, weight_sigma_m, applied, place_m, factor

@@ -44,19 +44,31 @@ class Settings(NamedTuple):
 def broadcast_sigmas_m(
     elevation_rad: FloatArray, count: FloatArray, measured_m: FloatArray, settings: Settings
 ) -> FloatArray:
-    """Sigmas ``(3, N)`` in the order of :class:`~gbas_ground.corrections.sigma.Sigmas`; `measured_m` may be empty."""
+    """Sigmas ``(3, N)`` in the order of :class:`~gbas_ground.corrections.sigma.Sigmas`.
+
+    `measured_m` has no row: the designator's; one: a receiver's own of the 100 s correction; four: own and shared of
+    each smoothing constant, which no inflation for anomalous ionosphere is put on here.
+    """
     sigmas = np.full((3, len(count)), np.nan)
     for i in range(len(count)):
+        base_30 = math.nan
         if len(measured_m) == 0:
             base = sigma_pr_gnd_of(settings.curves, elevation_rad[i], count[i], settings.mask_rad)
-        elif count[i] > 0.0 and elevation_rad[i] >= settings.mask_rad:
-            base = measured_m[i] / math.sqrt(count[i])
-        else:
+        elif not (count[i] > 0.0 and elevation_rad[i] >= settings.mask_rad):
             continue
+        elif len(measured_m) == 1:
+            base = measured_m[0, i] / math.sqrt(count[i])
+        else:
+            base = math.sqrt(measured_m[0, i] ** 2 / count[i] + measured_m[1, i] ** 2)
+            base_30 = math.sqrt(measured_m[2, i] ** 2 / count[i] + measured_m[3, i] ** 2)
         gnd_d = settings.inflation * base
-        sigmas[0, i] = settings.inflation_iono * gnd_d
         sigmas[1, i] = gnd_d
-        sigmas[2, i] = settings.factor_30s * gnd_d
+        if len(measured_m) <= 1:
+            sigmas[0, i] = settings.inflation_iono * gnd_d
+            sigmas[2, i] = settings.factor_30s * gnd_d
+        else:
+            sigmas[0, i] = gnd_d
+            sigmas[2, i] = settings.inflation * base_30
     return sigmas
 
 
