@@ -18,6 +18,7 @@ from gbas_ground.params import watching
 from gbas_ground.station import GroundEpoch, GroundStation
 from gbas_msgs_py.codes import ChannelState
 from gbas_msgs_py.products import L1_30, L1_100, L5_30, L5_100
+from gbas_msgs_py.tables import CHANNELS, INTEGRITY, MONITORS
 from gbas_vdb.transmission.receive import decode_burst
 from ground_runs import half_seconds, params, run
 from synthetic_ranges import truth
@@ -120,6 +121,20 @@ def test_the_first_band_is_what_it_is_without(two_bands):
             assert np.isnan(getattr(without, name)[[L5_100, L5_30]]).all()
         assert with_l5.state.tobytes() == without.state.tobytes()
     assert not [event for event in out.events if event.subject.endswith("/l5") and event.cause != "used"]
+
+
+def test_every_table_of_every_epoch_can_be_published(two_bands):
+    """There and back to the bit; the monitors have their rows of L5 beside those of L1."""
+    out = two_bands[2]
+    for schema, records in ((INTEGRITY, out.integrity), (MONITORS, out.statistics), (CHANNELS, out.channels)):
+        for record in records:
+            table = schema.encode(record)
+            again = schema.encode(schema.decode(schema.label_of(table), table))
+            assert again.tobytes() == table.tobytes()
+    signals = {(row.monitor, row.signal.name) for row in out.statistics[-1].select(sat="G01").rows()}
+    both = ("expected_range", "signal_power", "ccd", "expected_power", "b_value", "correction_limits", "sigma_monitor")
+    assert signals >= {(name, signal) for name in both for signal in ("L1", "L5")}
+    assert not {signal for _, signal in signals} - {"L1", "L5", "NONE", "L1_L5"}
 
 
 def test_inflation_for_anomalous_ionosphere_grows_with_the_delay():

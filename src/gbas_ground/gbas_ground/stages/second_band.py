@@ -167,7 +167,8 @@ def second_band(
         sigmas=sigmas,
         usable=usable,
     )
-    said = {**_summaries(checks, channels_tracked, agreement, decided), **sigma_summaries}
+    of_sigma = {key: each._replace(signal=SIGNAL) for key, each in sigma_summaries.items()}
+    said = {**_summaries(checks, channels_tracked, agreement, decided), **of_sigma}
     return after, SecondBand(corrections, usable, sent_m, said)
 
 
