@@ -166,8 +166,8 @@ def sky(params: FlightParams, rng: np.random.Generator) -> FloatArray:
     turned = rot_enu_ecef(*place)
     chosen = satellites_of(params.systems)
     seconds = np.arange(0.0, params.duration_s, SKY_S)
-    # positions at some times, straight between: 10 s of an orbit are straight to within 5e-7 rad from here
-    knots = np.arange(0.0, params.duration_s + 20.0, 10.0)
+    # positions at some times, straight between: 30 s of an orbit are straight to within 3e-6 rad from here
+    knots = np.arange(0.0, params.duration_s + 60.0, 30.0)
     positions = np.stack([nominal_positions_m(start_s + each)[:, chosen] for each in knots])
     los = np.stack([turned @ los_and_range(at, each)[0] for each in positions])
     between = np.stack([[np.interp(seconds, knots, los[:, k, i]) for i in range(los.shape[2])] for k in range(3)])

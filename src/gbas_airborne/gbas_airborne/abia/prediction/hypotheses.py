@@ -28,8 +28,8 @@ from gbas_core.record import FloatArray, IntArray
 
 SIGMAS: Final = 3.0
 """How far the grid reaches."""
-SHIFTS: Final = 13
-ERRORS: Final = 13
+SHIFTS: Final = 9
+ERRORS: Final = 9
 NEEDS_PLAN: Final = ("plan", "robust_plan", "likely_loss")
 
 

@@ -28,6 +28,10 @@ from gbas_core.compiled import compiled
 
 SECTORS: Final = 72
 """Of azimuth, for which harmless tilts are kept."""
+TOGETHER: Final = 10
+MOVED_RAD: Final = 2.5e-3
+"""Skies, a second apart, that share harmless tilts, and a bound of what satellites move in so many [rad]: at most
+2 pi radians in eleven hours of a circle seen from within are less than 2.5e-4 rad/s."""
 
 
 @compiled
@@ -43,10 +47,16 @@ def seen_counts(flown, los, times_a_sky, blocked, sin_horizon, axis):
 
 @compiled
 def harmless_by_sky(los, sin_horizon, required):
-    """Harmless tilts of each sky, (S, SECTORS)."""
+    """Harmless tilts of each sky, (S, SECTORS): those of some skies together, less how far satellites move in them."""
     tilts = np.empty((los.shape[0], SECTORS))
-    for s in range(los.shape[0]):
-        tilts[s] = harmless_tilts(los[s], sin_horizon, required, SECTORS)
+    for first in range(0, los.shape[0], TOGETHER):
+        last = min(first + TOGETHER, los.shape[0])
+        shared = los[first].copy()
+        for i in range(los.shape[2]):
+            for s in range(first, last):
+                if not np.isfinite(los[s, 2, i]):
+                    shared[:, i] = np.nan
+        tilts[first:last] = harmless_tilts(shared, sin_horizon, required, SECTORS) - MOVED_RAD
     return tilts
 
 
