@@ -16,7 +16,19 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         (f"share/{PACKAGE}", ["package.xml"]),
     ],
-    install_requires=["gbas_core", "gbas_vdb", "gbas_msgs_py", "gbas_node", "numpy", "PyYAML"],
+    install_requires=[
+        "gbas_core",
+        "gbas_vdb",
+        "gbas_msgs_py",
+        "gbas_node",
+        "embreex",
+        "imagecodecs",
+        "numpy",
+        "PyYAML",
+        "scipy",
+        "tifffile",
+        "trimesh",
+    ],
     zip_safe=True,
     entry_points={
         "console_scripts": [

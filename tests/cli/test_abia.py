@@ -6,6 +6,7 @@ import json
 from typing import Any
 
 import pytest
+import trimesh
 from typer.testing import CliRunner
 
 from gbas_cli.main import app
@@ -84,6 +85,41 @@ def test_tracking_loops_and_jamming():
 )
 def test_bad_options_are_one_line(arguments, message):
     result = abia(*arguments)
+    assert result.exit_code == 2
+    assert message in result.stderr
+    assert result.stderr.count("\n") == 1
+
+
+def test_mask_of_ours_and_of_a_file(tmp_path):
+    picture = tmp_path / "new" / "fighter.png"
+    document = json.loads(abia("mask", "fighter", "--out", picture, "--json").stdout)
+    assert picture.stat().st_size > 10_000
+    assert document["antenna_forward_right_down_m"] == [-0.88, 0.0, -0.74]
+    assert document["table_unlike_rays_percent"] < 0.3
+    trimesh.creation.box((10.0, 4.0, 2.0)).export(tmp_path / "block.stl")
+    result = abia("mask", tmp_path / "block.stl", "--antenna", "1,0.5,1.05", "--out", tmp_path / "block.png", "--json")
+    document = json.loads(result.stdout)
+    assert document["antenna_forward_right_down_m"] == [1.0, -0.5, -1.05]  # from forward, left, up
+    assert document["hidden_percent"] == 0.0  # all of the box is below the antenna's plane
+    assert "% of the antenna's hemisphere" in abia("mask", "small_uav", "--out", tmp_path / "uav.png").stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--antenna", "0,0,0.5"), "is inside the body"),
+        (("--antenna", "0,0,50"), "49.0 m off the body"),
+        (("--antenna", "top"), "--antenna is top: must be X,Y,Z in metres"),
+        (("--antenna", "0,0"), "--antenna is 0,0: must be X,Y,Z in metres"),
+        (("--antenna", "0,0,1.1", "--out", "mask.txt"), "--out is mask.txt: must be a .png"),
+        (("--antenna", "0,0,1.1", "--axes", "xyz"), "axes = 'xyz' is not three letters"),
+        (("--antenna", "0,0,1.1", "--scale-m", "0.001"), "the mesh is 0.01 m across"),
+        (("--antenna", "0,0,1.1", "--looks", "left"), "--looks is left: must be up or down"),
+    ],
+)
+def test_bad_masks_are_one_line(tmp_path, arguments, message):
+    trimesh.creation.box((10.0, 4.0, 2.0)).export(tmp_path / "block.stl")
+    result = abia("mask", tmp_path / "block.stl", *arguments)
     assert result.exit_code == 2
     assert message in result.stderr
     assert result.stderr.count("\n") == 1

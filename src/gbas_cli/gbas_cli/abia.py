@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from gbas_cli.base import Json, print_json, print_table
+from gbas_cli.base import Json, new_out, print_json, print_places, print_table
 from gbas_cli.siting import check, numbers_of
 
 if TYPE_CHECKING:
+    from gbas_airborne.abia.airframe.aircraft import Antenna
+    from gbas_airborne.abia.airframe.mesh import Airframe
     from gbas_core.record import FloatArray
     from gbas_core.signal.link_budget import LinkTerms
 
@@ -168,3 +171,85 @@ def tracking(
         print("the phase loop holds at no C/N0: what shakes it is beyond 15 degrees, one sigma, without any noise")
     for name, value in document.items():
         print(f"{name:28} {value:.3f}")
+
+
+@app.command()
+def mask(
+    mesh: Annotated[
+        str,
+        typer.Argument(metavar="MESH", help="STL, OBJ, PLY or GLB; or fighter, fighter_swept, airliner, small_uav."),
+    ],
+    antenna: Annotated[
+        str, typer.Option(metavar="X,Y,Z", help="Phase centre in the mesh's axes [m]; upper or lower of our aircraft.")
+    ] = "upper",
+    out: Annotated[Path | None, typer.Option(metavar="FILE.png", help="The picture (default: out/mask-N/).")] = None,
+    looks: Annotated[str | None, typer.Option(metavar="up|down", help="Where the antenna looks (default: up).")] = None,
+    horizon_deg: Annotated[float, typer.Option(metavar="E", help="Lowest elevation in the antenna's frame.")] = 5.0,
+    axes: Annotated[
+        str, typer.Option(metavar="LETTERS", help="What the mesh's x, y, z point to: f b, l r, u d.")
+    ] = "flu",
+    scale_m: Annotated[float, typer.Option(metavar="M", help="Metres a unit of the file.")] = 1.0,
+    open_mesh: Annotated[bool, typer.Option("--open-mesh", help="Take a mesh with holes as it is.")] = False,
+    as_json: Json = False,
+) -> None:
+    """Draw what an airframe hides from an antenna on it.
+
+    Axes are forward, left, up (flu) unless told otherwise. The mesh must be closed and the antenna outside of it; with
+    --open-mesh rays pass through its holes.
+    """
+    from gbas_airborne.abia.airframe.mask_table import MaskTable, share_unlike_rays
+    from gbas_studies.abia.mask_figure import mask_figure
+
+    check("--horizon-deg", horizon_deg, -90.0 <= horizon_deg < 90.0, "-90 to below 90 degrees")
+    check("--looks", looks, looks in (None, "up", "down"), "up or down")
+    if out is not None:
+        check("--out", out, out.suffix.lower() in (".png", ".svg", ".pdf"), "a .png, .svg or .pdf file")
+    airframe, placed = _mounted(mesh, antenna, looks, axes=axes, scale_m=scale_m, closed=not open_mesh)
+    table = MaskTable.of_mesh(airframe, placed.place_m, horizon_rad=math.radians(horizon_deg), axis=placed.axis)
+    unlike = share_unlike_rays(table, airframe, placed.place_m)
+    picture = out or new_out(None, "mask") / "mask.png"
+    picture.parent.mkdir(parents=True, exist_ok=True)
+    mask_figure(table, airframe, placed.place_m).savefig(picture, dpi=130)
+    document = {
+        "mesh": airframe.name,
+        "triangles": len(airframe.faces),
+        "checked_for_holes": airframe.closed,
+        "antenna_forward_right_down_m": list(placed.place_m),
+        "horizon_deg": horizon_deg,
+        "hidden_percent": 100.0 * table.blocked_share(),
+        "hidden_above_horizon_percent": 100.0 * table.blocked_share(max(table.horizon_rad, 0.0)),
+        "table_unlike_rays_percent": 100.0 * unlike,
+        "picture": str(picture),
+    }
+    if as_json:
+        print_json(document)
+        return
+    print(f"{airframe.name}: {len(airframe.faces)} triangles")
+    if not airframe.closed:
+        print("the mesh was not checked for holes: what is behind one counts as seen")
+    print(f"hidden by the airframe      {document['hidden_percent']:.3f} % of the antenna's hemisphere")
+    print(f"of what is above {horizon_deg:g} deg    {document['hidden_above_horizon_percent']:.3f} %")
+    print(f"table against direct rays   {document['table_unlike_rays_percent']:.3f} % of 65536 directions differ")
+    print_places({"picture": picture})
+
+
+def _mounted(
+    mesh: str, antenna: str, looks: str | None, *, axes: str, scale_m: float, closed: bool
+) -> tuple[Airframe, Antenna]:
+    """An airframe, ours or from a file, and an antenna on it."""
+    from gbas_airborne.abia.airframe.aircraft import AIRCRAFT, BODY_DOWN, Antenna, aircraft_of
+    from gbas_airborne.abia.airframe.mask_table import BODY_UP
+    from gbas_airborne.abia.airframe.mesh import axes_of, read_airframe
+
+    turn = axes_of(axes)
+    named = mesh in AIRCRAFT
+    airframe = aircraft_of(mesh).airframe if named else read_airframe(mesh, axes=axes, scale_m=scale_m, closed=closed)
+    axis = {"up": BODY_UP, "down": BODY_DOWN, None: None}[looks]
+    if named and "," not in antenna:
+        known = aircraft_of(mesh).antenna(antenna)
+        return airframe, known if axis is None else known._replace(axis=axis)
+    bound = "X,Y,Z in metres, in the mesh's axes" + (", or the name of an antenna" if named else "")
+    place = numbers_of("--antenna", antenna, bound)
+    check("--antenna", antenna, len(place) == 3, bound)
+    forward, right, down = (float(each) for each in turn @ place)
+    return airframe, Antenna("given", (forward, right, down), axis or BODY_UP)

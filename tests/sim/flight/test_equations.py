@@ -13,10 +13,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import root
 
+from gbas_core.gnss.attitude import body_rates, euler_angles, rot_body_enu
 from gbas_core.gnss.frames import geodetic_from_ecef
 from gbas_sim.flight.dynamics.aircraft import Aircraft
 from gbas_sim.flight.dynamics.atmosphere import standard_air
-from gbas_sim.flight.dynamics.attitude import body_rates, euler_angles, rot_body_enu
 from gbas_sim.flight.dynamics.equations import (
     Forces,
     Place,

@@ -1,1 +1,1 @@
-"""GPS time, Earth-fixed frames, ephemerides and orbits, and what one receiver observes."""
+"""GPS time, Earth-fixed frames and attitudes, ephemerides and orbits, and what one receiver observes."""

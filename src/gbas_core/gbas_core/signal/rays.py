@@ -63,8 +63,8 @@ class Scene:
     ] = "ground"
 
     @cached_property
-    def _planes(self) -> _Planes:
-        return _Planes.of(self.facets, self.ground is not None)
+    def _planes(self) -> Planes:
+        return Planes.of(self.facets, self.ground is not None)
 
     @cached_property
     def _materials(self) -> FloatArray:
@@ -91,7 +91,7 @@ class Scene:
         visible = np.isfinite(towards[..., 2]) & ~planes.meet(origin, towards, np.inf).any(axis=-1)
         if self.ground is not None:
             visible &= towards[..., 2] > 0.0
-        echoes = _Echoes.of(planes, origin, towards, above_ground=self.ground is not None)
+        echoes = Echoes.of(planes, origin, towards, above_ground=self.ground is not None)
         places = echoes.rank.max(initial=-1) + 1
         delay_m = np.zeros((places, *visible.shape))
         amplitude = np.zeros((places, visible.shape[0], N_BANDS, visible.shape[1]), dtype=np.complex128)
@@ -105,8 +105,22 @@ class Scene:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _Echoes:
-    """Single reflections, ``(E,)`` of them: whose they are, in which plane, and what they are like."""
+class Echoes:
+    """Single reflections, ``(E,)`` of them: whose they are, in which plane, and what they are like.
+
+    Attributes
+    ----------
+    plane, row, satellite : array
+        Plane it comes from, antenna and satellite it belongs to.
+    rank : array
+        Its number among those of the same antenna and satellite.
+    delay_m : array
+        Its path less that of the direct signal [m].
+    sine : array
+        Sine of its grazing angle.
+    arrival_up, direct_up : array
+        Upward components of the directions it and the direct signal arrive from.
+    """
 
     plane: IndexArray
     row: IndexArray
@@ -118,7 +132,7 @@ class _Echoes:
     direct_up: FloatArray
 
     @classmethod
-    def of(cls, planes: _Planes, origin: FloatArray, towards: FloatArray, *, above_ground: bool) -> _Echoes:
+    def of(cls, planes: Planes, origin: FloatArray, towards: FloatArray, *, above_ground: bool) -> Echoes:
         """Image method: the antenna's image is 2 h below it along the normal, the extra path 2 h sin(grazing angle).
 
         Source: Sabatini et al., eq (25) to (28), with dot products, for a satellite at infinity.
@@ -159,7 +173,7 @@ class _Echoes:
         return np.asarray(right * same + left * other)
 
 
-def _free(planes: _Planes, plane: IndexArray, start: FloatArray, point: FloatArray, towards: FloatArray) -> BoolArray:
+def _free(planes: Planes, plane: IndexArray, start: FloatArray, point: FloatArray, towards: FloatArray) -> BoolArray:
     """Whether no facet but the reflecting one is on the ways to the antenna and to the satellite."""
     way = point - start
     length = np.sqrt(_dot(way, way))
@@ -169,7 +183,7 @@ def _free(planes: _Planes, plane: IndexArray, start: FloatArray, point: FloatArr
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _Planes:
+class Planes:
     """Facets, and the ground last if there is one, as arrays (K, 3); the ground has no edges and hides nothing."""
 
     corner: FloatArray
@@ -180,7 +194,14 @@ class _Planes:
     endless: BoolArray
 
     @classmethod
-    def of(cls, facets: tuple[Facet, ...], ground: bool) -> _Planes:
+    def of_triangles(cls, corners_m: FloatArray) -> Planes:
+        """Triangles (K, 3 corners, 3) that reflect on the side from which their corners go counter-clockwise [m]."""
+        corner = corners_m[:, 0]
+        every = np.ones(len(corners_m), dtype=bool)
+        return cls._spanned(corner, corners_m[:, 1] - corner, corners_m[:, 2] - corner, every, ~every)
+
+    @classmethod
+    def of(cls, facets: tuple[Facet, ...], ground: bool) -> Planes:
         corner, first, second = (
             np.array([getattr(each, key) for each in facets] + [flat] * ground, dtype=np.float64).reshape(-1, 3)
             for key, flat in (
@@ -189,6 +210,15 @@ class _Planes:
                 ("second_m", (0.0, 1.0, 0.0)),
             )
         )
+        triangle = np.array([each.triangle for each in facets] + [False] * ground, dtype=bool)
+        endless = np.array([False] * len(facets) + [True] * ground, dtype=bool)
+        return cls._spanned(corner, first, second, triangle, endless)
+
+    @classmethod
+    def _spanned(
+        cls, corner: FloatArray, first: FloatArray, second: FloatArray, triangle: BoolArray, endless: BoolArray
+    ) -> Planes:
+        """By a corner and two edges each."""
         area = np.cross(first, second)
         square = _dot(area, area)[:, np.newaxis]
         return cls(
@@ -197,8 +227,8 @@ class _Planes:
             # Their products with a point of the plane, from the corner, are its shares of both edges.
             first_dual=np.cross(second, area) / square,
             second_dual=np.cross(area, first) / square,
-            triangle=np.array([each.triangle for each in facets] + [False] * ground, dtype=bool),
-            endless=np.array([False] * len(facets) + [True] * ground, dtype=bool),
+            triangle=triangle,
+            endless=endless,
         )
 
     def contain(self, point_m: FloatArray) -> BoolArray:

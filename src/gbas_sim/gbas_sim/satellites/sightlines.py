@@ -7,9 +7,10 @@ from typing import Final
 
 import numpy as np
 
-from gbas_core.gnss.frames import EARTH_RATE_RADPS, geodetic_from_ecef, los_and_range
+from gbas_core.gnss.frames import geodetic_from_ecef, los_and_range
 from gbas_core.gnss.orbits import SatelliteState, rotated_range
 from gbas_core.record import FloatArray
+from gbas_core.signal.doppler import range_rate_mps
 from gbas_core.signals import SPEED_OF_LIGHT_MPS
 from gbas_sim.satellites.broadcast import Arc
 
@@ -91,32 +92,6 @@ def sightlines(
     return Sightlines(
         range_m=range_m, range_rate_mps=rate, clock_s=state.clock_s, clock_drift=state.clock_drift * slowed
     )
-
-
-def range_rate_mps(
-    state: SatelliteState, range_m: FloatArray, los: FloatArray, position_m: FloatArray, velocity_mps: FloatArray
-) -> FloatArray:
-    """Rate of the light-time range against time at reception, ``(R, N_SATS)`` [m/s].
-
-    Notes
-    -----
-    The satellite's position is turned by the Earth's rotation in flight: s = R(w tau) s(t - tau), c tau = |s - r|.
-    Differentiating gives rate = e.(R v - v_r) / (1 + e.u / c), where u = R v + w x s is the satellite's velocity
-    against the stars, in the axes at reception. The denominator is the change of the flight time: 1e-5, or
-    millimetres per second.
-    """
-    seen = position_m[..., :, np.newaxis] + range_m[..., np.newaxis, :] * los
-    angle = EARTH_RATE_RADPS / SPEED_OF_LIGHT_MPS * range_m
-    sin_angle, cos_angle = np.sin(angle), np.cos(angle)
-    vx, vy, vz = (state.velocity_mps[..., axis, :] for axis in range(3))
-    turned_x, turned_y = cos_angle * vx + sin_angle * vy, cos_angle * vy - sin_angle * vx
-    ex, ey, ez = (los[..., axis, :] for axis in range(3))
-    own = velocity_mps[..., :, np.newaxis]
-    opening = ex * (turned_x - own[..., 0, :]) + ey * (turned_y - own[..., 1, :]) + ez * (vz - own[..., 2, :])
-    inertial_x = turned_x - EARTH_RATE_RADPS * seen[..., 1, :]
-    inertial_y = turned_y + EARTH_RATE_RADPS * seen[..., 0, :]
-    along = ex * inertial_x + ey * inertial_y + ez * vz
-    return np.asarray(opening / (1.0 + along / SPEED_OF_LIGHT_MPS))
 
 
 def verticals(position_m: FloatArray) -> tuple[FloatArray, FloatArray]:

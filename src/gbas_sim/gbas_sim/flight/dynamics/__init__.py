@@ -5,7 +5,7 @@ about, one subject a module: :mod:`segments` and :mod:`plan` say what is to be f
 and :mod:`reference` lay it out in time and space; :mod:`trim` finds the controls this takes and refuses what the
 aircraft cannot do; :mod:`guidance` steers along it and :mod:`motion` integrates the equations (:mod:`equations`) of an
 aircraft (:mod:`aircraft`, :mod:`fleet`) in the standard atmosphere (:mod:`atmosphere`), the wind (:mod:`wind`) and over
-the ellipsoid (:mod:`earth`); :mod:`attitude` turns motion and controls into attitude.
+the ellipsoid (:mod:`earth`); :mod:`gbas_core.gnss.attitude` turns motion and controls into attitude.
 
 Times are since the start of the flight. Vectors are ``(..., 3)``. Angles are radians; headings are true, clockwise from
 north; bank and roll are positive with the right wing down.

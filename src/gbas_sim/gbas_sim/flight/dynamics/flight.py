@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
+from gbas_core.gnss.attitude import body_rates, euler_angles, rot_body_enu
 from gbas_core.gnss.frames import ecef_from_geodetic, geodetic_from_ecef, rot_enu_ecef
 from gbas_core.record import FloatArray
 from gbas_sim.flight.dynamics.aircraft import Aircraft
-from gbas_sim.flight.dynamics.attitude import body_rates, euler_angles, rot_body_enu
 from gbas_sim.flight.dynamics.equations import Surroundings
 from gbas_sim.flight.dynamics.motion import Flown, Model, State, fly
 from gbas_sim.flight.dynamics.plan import FlightPlan

@@ -1,4 +1,4 @@
-"""Attitude of an aircraft that flies without sideslip: from its motion through the air, bank and angle of attack.
+"""Attitude of an aircraft: from its motion through the air without sideslip, from Euler angles, and what it turns.
 
 The lift is banked about the motion through the air; the fuselage is turned up from that by the angle of attack, in the
 plane of motion and lift. Wings level, pitch is climb angle plus angle of attack; banked, the nose also points into the
@@ -10,6 +10,7 @@ Source: Stevens, Lewis and Johnson, Aircraft Control and Simulation, 3rd edition
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from gbas_core.record import FloatArray
 
@@ -75,3 +76,32 @@ def body_rates(
         [about_motion * cosine - about_down * sine, about_right + pitching, about_motion * sine + about_down * cosine],
         axis=-1,
     )
+
+
+def rot_euler(roll_rad: ArrayLike, pitch_rad: ArrayLike, heading_rad: ArrayLike) -> FloatArray:
+    """Rotation from east, north, up to body axes of an attitude, the inverse of :func:`euler_angles`, (..., 3, 3)."""
+    roll, pitch, heading = np.broadcast_arrays(
+        *(np.asarray(each, dtype=np.float64) for each in (roll_rad, pitch_rad, heading_rad))
+    )
+    return rot_body_enu(pitch, heading, roll, np.zeros_like(roll))
+
+
+def body_azimuth_elevation(rot: FloatArray, los_enu: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Azimuth (from the nose clockwise seen from above, -pi to pi) and elevation above the wings' plane [rad].
+
+    Parameters
+    ----------
+    rot : (..., 3, 3) array
+        From east, north, up to body axes.
+    los_enu : (..., 3, N) array
+        Unit vectors to satellites.
+
+    Returns
+    -------
+    (..., N) arrays
+
+    Source: Sabatini, Moore, Hill, WASET 7 (2013), eq (11).
+    """
+    body = rot @ los_enu
+    forward, right, down = body[..., 0, :], body[..., 1, :], body[..., 2, :]
+    return np.arctan2(right, forward), np.arctan2(-down, np.hypot(forward, right))
