@@ -12,7 +12,7 @@ import numpy as np
 from gbas_airborne.abia.airframe.mask_table import BODY_UP, MaskTable
 from gbas_airborne.abia.prediction.hypotheses import hypotheses_of
 from gbas_airborne.abia.prediction.identification import identification_vector
-from gbas_airborne.abia.prediction.look_ahead import look_vector
+from gbas_airborne.abia.prediction.look_ahead import antenna_vector, look_vector
 from gbas_airborne.abia.prediction.params import PredictionParams
 from gbas_core.record import BoolArray, FloatArray
 from gbas_studies.abia.flights import SKY_S, TICK_S, FlownFlight
@@ -45,9 +45,8 @@ def counted_on(flight: FlownFlight, params: PredictionParams) -> FloatArray:
 
 def seen(flight: FlownFlight, mask: MaskTable, horizon_rad: float) -> FloatArray:
     """How many satellites are seen at each time, (T,), with another antenna horizon."""
-    counts = seen_counts(
-        flight.flown, flight.los_enu, TIMES_A_SKY, mask.blocked, math.sin(horizon_rad), np.array(mask.axis)
-    )
+    antenna = antenna_vector(replace(mask, horizon_rad=horizon_rad))
+    counts = seen_counts(flight.flown, flight.los_enu, TIMES_A_SKY, mask.blocked, antenna)
     return np.asarray(counts)
 
 
@@ -94,7 +93,7 @@ def probability(name: str, flight: FlownFlight, mask: MaskTable, params: Predict
         flight.flown, TICK_S, EVERY, TIMES_A_SKY, np.ascontiguousarray(plan_bank), np.zeros_like(plan_bank), TICK_S,
         ways.kinds, ways.values, look_vector(params, ways.anchor_rad), ways.shifts_s, ways.errors_rad, ways.prior_shift,
         ways.prior_error, identification_vector(params), shared.los_enu, shared.harmless_rad, mask.blocked,
-        math.sin(mask.horizon_rad), np.array(mask.axis), params.required_satellites, params.least_weight,
+        antenna_vector(mask), params.required_satellites, params.least_weight,
     )  # fmt: skip
     return np.asarray(found)
 

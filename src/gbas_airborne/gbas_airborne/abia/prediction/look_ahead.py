@@ -71,8 +71,15 @@ def seen_at(attitudes_rad: FloatArray, los_enu: FloatArray, mask: MaskTable) -> 
     mask : MaskTable
     """
     flat = np.ascontiguousarray(attitudes_rad.reshape(-1, 3), dtype=np.float64)
-    seen = all_seen(flat, los_enu, mask.blocked, math.sin(mask.horizon_rad), np.array(mask.axis))
+    seen = all_seen(flat, los_enu, mask.blocked, antenna_vector(mask))
     return np.asarray(seen).reshape(*attitudes_rad.shape[:-1], los_enu.shape[1])
+
+
+def antenna_vector(mask: MaskTable) -> FloatArray:
+    """Axis, horizon and highest elevation the airframe hides, in the order of the kernels."""
+    rows = np.flatnonzero(mask.blocked.any(axis=0))
+    sin_top = math.sin(math.pi * ((rows[-1] + 1) / mask.blocked.shape[1] - 0.5)) if rows.size else -2.0
+    return np.array([*mask.axis, math.sin(mask.horizon_rad), sin_top])
 
 
 def usable_los(los_enu: FloatArray, elevation_mask_rad: float) -> FloatArray:
@@ -108,8 +115,7 @@ def look_ahead(
     los, mask = sky
     there = np.flatnonzero(np.isfinite(los[2]))
     short_s, lost_there_s = first_lost(
-        attitudes, params.step_s, np.ascontiguousarray(los[:, there]), mask.blocked, math.sin(mask.horizon_rad),
-        np.array(mask.axis), params.required_satellites,
+        attitudes, params.step_s, np.ascontiguousarray(los[:, there]), mask.blocked, antenna_vector(mask), params.required_satellites,
     )  # fmt: skip
     lost_s = np.full((len(attitudes), los.shape[1]), np.inf)
     lost_s[:, there] = lost_there_s

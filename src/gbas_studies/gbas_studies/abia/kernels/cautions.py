@@ -35,13 +35,13 @@ MOVED_RAD: Final = 2.5e-3
 
 
 @compiled
-def seen_counts(flown, los, times_a_sky, blocked, sin_horizon, axis):
+def seen_counts(flown, los, times_a_sky, blocked, antenna):
     """Satellites seen at each time of a flight, (T,); flown (T, 5) as in the prediction, los (S, 3, N)."""
     counts = np.empty(flown.shape[0], np.int64)
     rot = np.empty((4, 3))
     for t in range(flown.shape[0]):
-        rotation(flown[t, BANK], flown[t, PITCH], flown[t, HEADING], axis, rot)
-        counts[t] = count_seen(rot, los[t // times_a_sky], blocked, sin_horizon)
+        rotation(flown[t, BANK], flown[t, PITCH], flown[t, HEADING], antenna, rot)
+        counts[t] = count_seen(rot, los[t // times_a_sky], blocked, antenna)
     return counts
 
 
@@ -88,7 +88,7 @@ def steepest_ahead(kinds, now, blocks, place, reach, error, roll_time):
 @compiled
 def loss_probabilities(
     flown, elapsed, every, times_a_sky, plan_bank, plan_pitch, plan_step, kinds, hypotheses, look, shifts, errors,
-    prior_shift, prior_error, how, los, harmless, blocked, sin_horizon, axis, required, least,
+    prior_shift, prior_error, how, los, harmless, blocked, antenna, required, least,
 ):  # fmt: skip
     """Weight of the hypotheses that lose too many satellites, (T,), looked at anew each so many times.
 
@@ -127,6 +127,6 @@ def loss_probabilities(
             continue
         found[t], _ = loss_probability(
             kinds, values, flown[t], plan_bank, plan_pitch, place, plan_step, look, los[sky], harmless[sky], blocked,
-            sin_horizon, axis, required, attitudes, rot, least,
+            antenna, required, attitudes, rot, least,
         )  # fmt: skip
     return found

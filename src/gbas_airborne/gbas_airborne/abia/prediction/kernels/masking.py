@@ -9,9 +9,13 @@ import numpy as np
 
 from gbas_core.compiled import compiled
 
+SIN_HORIZON, SIN_TOP = 3, 4
+"""Places in the vector of an antenna, after its axis (forward, right, down): sines of its horizon, and of the elevation
+in the body frame above which the airframe hides nothing."""
+
 
 @compiled
-def rotation(bank, pitch, heading, axis, rot):
+def rotation(bank, pitch, heading, antenna, rot):
     """Rotation from east, north, up to the body frame (forward, right, down) into ``rot`` (4, 3).
 
     The last row is the antenna's axis in local axes.
@@ -25,23 +29,23 @@ def rotation(bank, pitch, heading, axis, rot):
     rot[1, 0], rot[1, 1], rot[1, 2] = sb * sp * sh + cb * ch, sb * sp * ch - cb * sh, -sb * cp
     rot[2, 0], rot[2, 1], rot[2, 2] = cb * sp * sh - sb * ch, cb * sp * ch + sb * sh, -cb * cp
     for k in range(3):
-        rot[3, k] = axis[0] * rot[0, k] + axis[1] * rot[1, k] + axis[2] * rot[2, k]
+        rot[3, k] = antenna[0] * rot[0, k] + antenna[1] * rot[1, k] + antenna[2] * rot[2, k]
 
 
 @compiled
-def sees(rot, los, i, blocked, sin_horizon):
+def sees(rot, los, i, blocked, antenna):
     """Whether satellite i is seen: above the antenna's horizon, and the airframe is not in the way, as
     :class:`~gbas_airborne.abia.airframe.mask_table.MaskTable` has it; one without a line of sight (NaN) is not.
     """
     east, north, up = los[0, i], los[1, i], los[2, i]
-    if not rot[3, 0] * east + rot[3, 1] * north + rot[3, 2] * up >= sin_horizon:
+    if not rot[3, 0] * east + rot[3, 1] * north + rot[3, 2] * up >= antenna[SIN_HORIZON]:
         return False
-    columns, rows = blocked.shape
-    if columns == 1 and rows == 1:
-        return not blocked[0, 0]
+    down = rot[2, 0] * east + rot[2, 1] * north + rot[2, 2] * up
+    if -down > antenna[SIN_TOP]:
+        return True
     forward = rot[0, 0] * east + rot[0, 1] * north + rot[0, 2] * up
     right = rot[1, 0] * east + rot[1, 1] * north + rot[1, 2] * up
-    down = rot[2, 0] * east + rot[2, 1] * north + rot[2, 2] * up
+    columns, rows = blocked.shape
     elevation = math.asin(min(max(-down, -1.0), 1.0))
     column = math.floor(math.atan2(right, forward) * (columns / (2.0 * math.pi))) % columns
     row = min(int((elevation / math.pi + 0.5) * rows), rows - 1)
@@ -49,28 +53,28 @@ def sees(rot, los, i, blocked, sin_horizon):
 
 
 @compiled
-def count_seen(rot, los, blocked, sin_horizon):
+def count_seen(rot, los, blocked, antenna):
     """How many satellites are seen with that rotation."""
     count = 0
     for i in range(los.shape[1]):
-        count += sees(rot, los, i, blocked, sin_horizon)
+        count += sees(rot, los, i, blocked, antenna)
     return count
 
 
 @compiled
-def all_seen(attitudes, los, blocked, sin_horizon, axis):
+def all_seen(attitudes, los, blocked, antenna):
     """Satellites seen at attitudes (M, 3) of bank, pitch and heading, (M, N) bool; one not finite sees none."""
     seen = np.zeros((attitudes.shape[0], los.shape[1]), np.bool_)
     rot = np.empty((4, 3))
     for m in range(attitudes.shape[0]):
-        rotation(attitudes[m, 0], attitudes[m, 1], attitudes[m, 2], axis, rot)
+        rotation(attitudes[m, 0], attitudes[m, 1], attitudes[m, 2], antenna, rot)
         for i in range(los.shape[1]):
-            seen[m, i] = sees(rot, los, i, blocked, sin_horizon)
+            seen[m, i] = sees(rot, los, i, blocked, antenna)
     return seen
 
 
 @compiled
-def first_lost(attitudes, step, los, blocked, sin_horizon, axis, required):
+def first_lost(attitudes, step, los, blocked, antenna, required):
     """When too few satellites are seen first, (H,), and each is lost that is seen now, (H, N), infinite when never [s].
 
     attitudes are (H, K, 3); K of them a step apart.
@@ -82,10 +86,10 @@ def first_lost(attitudes, step, los, blocked, sin_horizon, axis, required):
     now = np.zeros(los.shape[1], np.bool_)
     for h in range(n_ways):
         for k in range(n_steps):
-            rotation(attitudes[h, k, 0], attitudes[h, k, 1], attitudes[h, k, 2], axis, rot)
+            rotation(attitudes[h, k, 0], attitudes[h, k, 1], attitudes[h, k, 2], antenna, rot)
             count = 0
             for i in range(los.shape[1]):
-                seen = sees(rot, los, i, blocked, sin_horizon)
+                seen = sees(rot, los, i, blocked, antenna)
                 count += seen
                 if k == 0:
                     now[i] = seen

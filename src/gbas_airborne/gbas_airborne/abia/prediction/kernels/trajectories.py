@@ -102,7 +102,7 @@ def trajectories(kinds, hypotheses, now, plan_bank, plan_pitch, place, plan_step
 
 
 @compiled
-def first_short(attitudes, step, los, harmless, blocked, sin_horizon, axis, required, rot):
+def first_short(attitudes, step, los, harmless, blocked, antenna, required, rot):
     """Time at which fewer satellites than required are seen first [s], infinite when never.
 
     harmless are tilts that cost no satellites that are required, as :func:`~.masking.harmless_tilts` has them; empty:
@@ -111,15 +111,15 @@ def first_short(attitudes, step, los, harmless, blocked, sin_horizon, axis, requ
     for k in range(attitudes.shape[0]):
         if is_harmless(attitudes[k, 0], attitudes[k, 1], attitudes[k, 2], harmless):
             continue
-        rotation(attitudes[k, 0], attitudes[k, 1], attitudes[k, 2], axis, rot)
-        if count_seen(rot, los, blocked, sin_horizon) < required:
+        rotation(attitudes[k, 0], attitudes[k, 1], attitudes[k, 2], antenna, rot)
+        if count_seen(rot, los, blocked, antenna) < required:
             return k * step
     return math.inf
 
 
 @compiled
 def loss_probability(
-    kinds, hypotheses, now, plan_bank, plan_pitch, place, plan_step, look, los, harmless, blocked, sin_horizon, axis,
+    kinds, hypotheses, now, plan_bank, plan_pitch, place, plan_step, look, los, harmless, blocked, antenna,
     required, attitudes, rot, least,
 ):  # fmt: skip
     """Weight of the hypotheses that lose too many satellites, and the soonest loss among them [s].
@@ -131,7 +131,7 @@ def loss_probability(
         if not hypotheses[h, WEIGHT] > least:
             continue
         fill_trajectory(kinds[h], hypotheses[h], now, plan_bank, plan_pitch, place, plan_step, look, attitudes)
-        found = first_short(attitudes, look[STEP], los, harmless, blocked, sin_horizon, axis, required, rot)
+        found = first_short(attitudes, look[STEP], los, harmless, blocked, antenna, required, rot)
         if found < math.inf:
             probability += hypotheses[h, WEIGHT]
             soonest = min(soonest, found)
