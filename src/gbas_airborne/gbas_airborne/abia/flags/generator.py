@@ -134,7 +134,7 @@ def _system(
         unmonitored += [Cause.PROTECTION, Cause.SERVICE]
     else:
         predicted_s = levels.exceeded_s if levels else math.nan
-        system[Cause.PROTECTION] = max(protection, _level(False, not predicted_s == math.inf))
+        system[Cause.PROTECTION] = max(protection, _level(False, predicted_s != math.inf))
         times_s[Cause.PROTECTION] = predicted_s
         system[Cause.SERVICE] = service
     return system, times_s, tuple(unmonitored)

@@ -115,7 +115,8 @@ def look_ahead(
     los, mask = sky
     there = np.flatnonzero(np.isfinite(los[2]))
     short_s, lost_there_s = first_lost(
-        attitudes, params.step_s, np.ascontiguousarray(los[:, there]), mask.blocked, antenna_vector(mask), params.required_satellites,
+        attitudes, params.step_s, np.ascontiguousarray(los[:, there]), mask.blocked, antenna_vector(mask),
+        params.required_satellites,
     )  # fmt: skip
     lost_s = np.full((len(attitudes), los.shape[1]), np.inf)
     lost_s[:, there] = lost_there_s
