@@ -87,14 +87,15 @@ class FlownFlight:
     plan_bank_rad : (T,) array
     los_enu : (S, 3, N) array
         Lines of sight, :data:`SKY_S` apart, of the satellites that are above the elevation mask at any time, NaN below.
-    turns : tuple of Turn
-        As planned.
+    turns, flown_turns : tuples of Turn
+        As planned and as flown.
     """
 
     flown: FloatArray
     plan_bank_rad: FloatArray
     los_enu: FloatArray
     turns: tuple[Turn, ...]
+    flown_turns: tuple[Turn, ...]
 
 
 def bank_profile(turns: tuple[Turn, ...], time_s: FloatArray) -> FloatArray:
@@ -120,8 +121,9 @@ def drawn_flight(params: FlightParams, rng: np.random.Generator) -> FlownFlight:
     heading = heading_rad + np.concatenate([[0.0], np.cumsum(0.5 * TICK_S * (rate[1:] + rate[:-1]))])
     columns = bank, np.zeros_like(bank), heading, np.gradient(bank, TICK_S), np.full_like(bank, speed_mps)
     return FlownFlight(
-        flown=np.stack(columns, axis=1), plan_bank_rad=bank_profile(planned, time_s), los_enu=los, turns=planned
-    )
+        flown=np.stack(columns, axis=1), plan_bank_rad=bank_profile(planned, time_s), los_enu=los, turns=planned,
+        flown_turns=flown,
+    )  # fmt: skip
 
 
 def _turns(params: FlightParams, rng: np.random.Generator) -> tuple[tuple[Turn, ...], tuple[Turn, ...]]:
