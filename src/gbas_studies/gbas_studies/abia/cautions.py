@@ -12,7 +12,7 @@ import numpy as np
 from gbas_airborne.abia.airframe.mask_table import BODY_UP, MaskTable
 from gbas_airborne.abia.prediction.hypotheses import hypotheses_of
 from gbas_airborne.abia.prediction.identification import identification_vector
-from gbas_airborne.abia.prediction.look_ahead import antenna_vector, look_vector
+from gbas_airborne.abia.prediction.look_ahead import antenna_vector, higher, look_vector
 from gbas_airborne.abia.prediction.params import PredictionParams
 from gbas_core.record import BoolArray, FloatArray
 from gbas_studies.abia.flights import SKY_S, TICK_S, FlownFlight
@@ -79,8 +79,13 @@ def skies(flight: FlownFlight, mask: MaskTable, params: PredictionParams) -> Ski
     return Skies(los_enu=los, harmless_rad=harmless)
 
 
-def probability(name: str, flight: FlownFlight, mask: MaskTable, params: PredictionParams, shared: Skies) -> FloatArray:
-    """Weight of the ways of flying on that lose too many satellites, at each time, (T,), by a predictor's name."""
+def probability(
+    name: str, flight: FlownFlight, mask: MaskTable, params: PredictionParams, known: dict[tuple[float, float], Skies]
+) -> FloatArray:
+    """Weight of the ways of flying on that lose too many satellites, at each time, (T,), by a predictor's name.
+
+    known are skies of the flight by antenna horizon and look-ahead; what is missing is added.
+    """
     if name == "margin":
         return on_the_margin(flight, mask, params).astype(np.float64)
     if name == PERFECT:
@@ -89,6 +94,11 @@ def probability(name: str, flight: FlownFlight, mask: MaskTable, params: Predict
     else:
         plan_bank = flight.plan_bank_rad
     ways = hypotheses_of(name, params)
+    mask = higher(mask, ways.horizon_margin_rad)
+    key = mask.horizon_rad, params.horizon_s
+    if key not in known:
+        known[key] = skies(flight, mask, params)
+    shared = known[key]
     found = loss_probabilities(
         flight.flown, TICK_S, EVERY, TIMES_A_SKY, np.ascontiguousarray(plan_bank), np.zeros_like(plan_bank), TICK_S,
         ways.kinds, ways.values, look_vector(params, ways.anchor_rad), ways.shifts_s, ways.errors_rad, ways.prior_shift,
@@ -107,8 +117,8 @@ def threshold(name: str, params: PredictionParams) -> float:
 
 def judged(names: tuple[str, ...], flight: FlownFlight, mask: MaskTable, params: PredictionParams) -> Judged:
     """All of them for one flight."""
-    shared = skies(flight, mask, params)
-    found = {name: probability(name, flight, mask, params, shared) for name in names if name != BOTH}
+    known: dict[tuple[float, float], Skies] = {}
+    found = {name: probability(name, flight, mask, params, known) for name in names if name != BOTH}
     return Judged(loss=losses(flight, mask, params.required_satellites), probability=found)
 
 

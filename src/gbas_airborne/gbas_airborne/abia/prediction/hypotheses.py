@@ -45,6 +45,8 @@ class Hypotheses:
         How late [s], error of bank [rad], weight [-].
     anchor_rad : float
         Half the width in bank that a hypothesis of the plan stands for [rad].
+    horizon_margin_rad : float
+        By which the antenna's horizon is taken higher [rad].
     caution_weight : float
         Caution from this weight of losses.
     shifts_s, errors_rad, prior_shift, prior_error : arrays
@@ -54,6 +56,7 @@ class Hypotheses:
     kinds: IntArray
     values: FloatArray
     anchor_rad: float
+    horizon_margin_rad: float
     caution_weight: float
     shifts_s: FloatArray
     errors_rad: FloatArray
@@ -85,7 +88,7 @@ def hypotheses_of(name: str, params: PredictionParams) -> Hypotheses:
     return Hypotheses(
         kinds=np.array([kind for kind, _, _ in chosen], dtype=np.int64),
         values=np.array([(s, e, 1.0 / len(chosen)) for _, s, e in chosen]).reshape(-1, 3),
-        anchor_rad=0.0, caution_weight=0.5 / max(len(chosen), 1),
+        anchor_rad=0.0, horizon_margin_rad=0.0, caution_weight=0.5 / max(len(chosen), 1),
         shifts_s=empty, errors_rad=empty, prior_shift=empty, prior_error=empty,
     )  # fmt: skip
 
@@ -100,7 +103,8 @@ def _grid(params: PredictionParams) -> Hypotheses:
     return Hypotheses(
         kinds=np.append(np.full(len(grid), PLAN), ROLL).astype(np.int64),
         values=values,
-        anchor_rad=float(0.5 * (errors[1] - errors[0])), caution_weight=params.caution_probability,
+        anchor_rad=float(0.5 * (errors[1] - errors[0])), horizon_margin_rad=params.horizon_margin_rad,
+        caution_weight=params.caution_probability,
         shifts_s=shifts, errors_rad=errors, prior_shift=prior_shift, prior_error=prior_error,
     )  # fmt: skip
 

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -33,7 +33,7 @@ class Outcome:
     short_s : (H,) array
         When fewer satellites than required are seen first, infinite when never [s].
     lost_s : (H, N) array
-        When each satellite that is seen now is first not seen, infinite when never or not seen now [s].
+        When each satellite is first not seen, infinite when never; 0 of one that is not seen now [s].
     """
 
     weights: FloatArray
@@ -52,7 +52,7 @@ class Outcome:
         return float(self.short_s.min(initial=math.inf))
 
     def satellites(self) -> tuple[FloatArray, FloatArray]:
-        """Weight of the ways on which each satellite is lost, and when it is lost first on any, (N,) each."""
+        """Weight of the ways on which each satellite is not seen, and when it is first on any, (N,) each."""
         return self.weights @ np.isfinite(self.lost_s), self.lost_s.min(axis=0, initial=math.inf)
 
 
@@ -80,6 +80,11 @@ def antenna_vector(mask: MaskTable) -> FloatArray:
     rows = np.flatnonzero(mask.blocked.any(axis=0))
     sin_top = math.sin(math.pi * ((rows[-1] + 1) / mask.blocked.shape[1] - 0.5)) if rows.size else -2.0
     return np.array([*mask.axis, math.sin(mask.horizon_rad), sin_top])
+
+
+def higher(mask: MaskTable, margin_rad: float) -> MaskTable:
+    """The mask with a higher horizon of the antenna."""
+    return replace(mask, horizon_rad=mask.horizon_rad + margin_rad) if margin_rad else mask
 
 
 def usable_los(los_enu: FloatArray, elevation_mask_rad: float) -> FloatArray:
@@ -112,7 +117,7 @@ def look_ahead(
         ways.kinds[followed], np.ascontiguousarray(values[followed]), attitude.vector(), plan.bank_rad, plan.pitch_rad,
         plan.place(time_s), plan.step_s, look_vector(params, ways.anchor_rad),
     )  # fmt: skip
-    los, mask = sky
+    los, mask = sky[0], higher(sky[1], ways.horizon_margin_rad)
     there = np.flatnonzero(np.isfinite(los[2]))
     short_s, lost_there_s = first_lost(
         attitudes, params.step_s, np.ascontiguousarray(los[:, there]), mask.blocked, antenna_vector(mask),

@@ -62,6 +62,13 @@ class PredictionParams:
     caution_probability: Annotated[
         float, Parameter("likely_loss: caution from this probability of a loss within the horizon", "-", 1e-3, 1.0)
     ] = 0.1
+    horizon_margin_rad: Annotated[
+        float,
+        Parameter(
+            "likely_loss: the antenna's horizon is taken so much higher ahead, for losses that only just happen",
+            "deg", 0.0, 10.0,
+        ),
+    ] = math.radians(0.25)  # fmt: skip
     least_weight: Annotated[
         float, Parameter("likely_loss: less likely ways of flying the plan are not looked at", "-", 0.0, 0.1)
     ] = 1e-3

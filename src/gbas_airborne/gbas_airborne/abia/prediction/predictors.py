@@ -162,7 +162,7 @@ def _judged(
     caution = probability >= ways.caution_weight
     if params.margin_rule or name == "margin":
         caution = caution or _on_the_margin(seen, epoch, los, params)
-    satellite_probability, satellite_loss_s = outcome.satellites()
+    weight, loss_s = outcome.satellites()
     return Prediction(
         available=True,
         restriction=NO_PLAN if name != params.predictor else "",
@@ -171,8 +171,8 @@ def _judged(
         probability=probability,
         loss_s=soonest_s,
         seen=seen,
-        satellite_probability=satellite_probability,
-        satellite_loss_s=satellite_loss_s,
+        satellite_probability=np.where(seen, weight, 0.0),
+        satellite_loss_s=np.where(seen, loss_s, np.inf),
         outcome=outcome,
     )
 

@@ -29,8 +29,8 @@ class Candidate:
     plan : AttitudePlan
     speed_mps : float
     change_rad : float
-        Largest change of bank against the plan, with a tenth of a radian for each tenth of the speed: what candidates
-        are ordered by.
+        Largest change of bank against the plan over the horizon, with a tenth of a radian for each tenth of the speed:
+        what candidates are ordered by. After the horizon the turn is only longer or shorter.
     """
 
     kind: str
@@ -50,8 +50,10 @@ def candidates(time_s: float, attitude: Attitude, plan: AttitudePlan, params: St
     plan : AttitudePlan
     params : SteeringParams
     """
+    first = max(math.floor(plan.place(time_s)), 0)
+    places = slice(first, first + round(params.horizon_s / plan.step_s))
     found = [
-        Candidate(kind=kind, plan=flown, speed_mps=speed_mps, change_rad=_change_rad(flown, plan, time_s, speed))
+        Candidate(kind=kind, plan=flown, speed_mps=speed_mps, change_rad=_change_rad(flown, plan, places) + speed)
         for kind, flown, speed_mps, speed in _all(time_s, attitude, plan, params)
         if _is_flyable(flown, time_s, speed_mps, params)
     ]
@@ -96,11 +98,9 @@ def _scaled(
 def _rolled(wanted: FloatArray, first: int, bank_rad: float, largest: float) -> FloatArray:
     """Bank from a sample on that follows the wanted one from what is flown, rolling no faster than a bound a sample."""
     bank = wanted.copy()
-    flown = bank_rad
-    for k in range(first, bank.size):
-        reached = k > first and abs(wanted[k] - flown) <= largest
-        flown = wanted[k] if reached else flown + min(max(wanted[k] - flown, -largest), largest)
-        bank[k] = flown if k > first else bank_rad
+    bank[first] = bank_rad
+    for k in range(first + 1, bank.size):
+        bank[k] = bank[k - 1] + min(max(wanted[k] - bank[k - 1], -largest), largest)
     return bank
 
 
@@ -134,10 +134,10 @@ def _with_heading_regained(
     return np.delete(bank, left_out), np.delete(pitch, left_out)
 
 
-def _change_rad(flown: AttitudePlan, plan: AttitudePlan, time_s: float, speed_share: float) -> float:
-    first = max(math.floor(plan.place(time_s)), 0)
-    shared = min(flown.bank_rad.size, plan.bank_rad.size)
-    return float(np.abs(flown.bank_rad[first:shared] - plan.bank_rad[first:shared]).max(initial=0.0) + speed_share)
+def _change_rad(flown: AttitudePlan, plan: AttitudePlan, places: slice) -> float:
+    one, other = flown.bank_rad[places], plan.bank_rad[places]
+    shared = min(one.size, other.size)
+    return float(np.abs(one[:shared] - other[:shared]).max(initial=0.0))
 
 
 def _is_flyable(flown: AttitudePlan, time_s: float, speed_mps: float, params: SteeringParams) -> bool:

@@ -75,7 +75,7 @@ def all_seen(attitudes, los, blocked, antenna):
 
 @compiled
 def first_lost(attitudes, step, los, blocked, antenna, required):
-    """When too few satellites are seen first, (H,), and each is lost that is seen now, (H, N), infinite when never [s].
+    """When too few satellites are seen first, (H,), and each is first not seen, (H, N), infinite when never [s].
 
     attitudes are (H, K, 3); K of them a step apart.
     """
@@ -83,7 +83,6 @@ def first_lost(attitudes, step, los, blocked, antenna, required):
     short = np.full(n_ways, math.inf)
     lost = np.full((n_ways, los.shape[1]), math.inf)
     rot = np.empty((4, 3))
-    now = np.zeros(los.shape[1], np.bool_)
     for h in range(n_ways):
         for k in range(n_steps):
             rotation(attitudes[h, k, 0], attitudes[h, k, 1], attitudes[h, k, 2], antenna, rot)
@@ -91,9 +90,7 @@ def first_lost(attitudes, step, los, blocked, antenna, required):
             for i in range(los.shape[1]):
                 seen = sees(rot, los, i, blocked, antenna)
                 count += seen
-                if k == 0:
-                    now[i] = seen
-                elif now[i] and not seen and lost[h, i] == math.inf:
+                if not seen and lost[h, i] == math.inf:
                     lost[h, i] = k * step
             if count < required and short[h] == math.inf:
                 short[h] = k * step
