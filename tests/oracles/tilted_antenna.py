@@ -1,4 +1,4 @@
-"""What an antenna on a turning aircraft sees, vector by vector: axes turned by Rodrigues' formula, one step after another."""
+"""What an antenna on a turning aircraft sees, vector by vector, with axes turned by Rodrigues' formula."""
 
 from __future__ import annotations
 

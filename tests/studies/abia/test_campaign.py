@@ -99,7 +99,7 @@ def series(text: str) -> np.ndarray:
 
 
 def test_scores_counted_by_hand() -> None:
-    """Times a second apart. The first loss has a lead of 3 s, the second none; the caution at the end is for nothing."""
+    """Times a second apart. The first loss has a lead of 3 s, the second none; the last caution is for nothing."""
     loss = series("......xx.....x...........")
     caution = series("...xxxxx..............xx.")
     found = score(loss, caution, tick_s=1.0, horizon_s=2.0)
@@ -107,10 +107,13 @@ def test_scores_counted_by_hand() -> None:
     assert (found.cautions, found.false) == (3, 1)
     assert found.caution_s == 5.0
     late = score(series("......x."), series("...x...."), tick_s=1.0, horizon_s=2.0)
-    assert late.false == 1 and late.lead_s == (0.0,)  # over before the loss, which is not within the horizon either
+    assert late.false == 1
+    assert late.lead_s == (0.0,)
     whole = summary([found, found])
     assert (whole.onsets, whole.cautions) == (4, 6)
-    assert whole.enough.value == 0.5 and whole.missed.value == 0.5 and whole.false.value == pytest.approx(1.0 / 3.0)
+    assert whole.enough.value == 0.5
+    assert whole.missed.value == 0.5
+    assert whole.false.value == pytest.approx(1.0 / 3.0)
     assert whole.enough.low == whole.enough.high == 0.5  # all flights alike
 
 

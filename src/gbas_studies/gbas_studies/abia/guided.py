@@ -54,8 +54,8 @@ AIRCRAFT: Final[dict[str, tuple[FlightParams, SteeringParams]]] = {
     ),
     "uav": (
         FlightParams(
-            duration_s=100.0, speed_mps=(25.0, 40.0), bank_rad=(math.radians(20.0), math.radians(55.0)), turn_s=(20.0, 50.0),
-            straight_s=(10.0, 15.0),
+            duration_s=100.0, speed_mps=(25.0, 40.0), bank_rad=(math.radians(20.0), math.radians(55.0)),
+            turn_s=(20.0, 50.0), straight_s=(10.0, 15.0),
         ),
         SteeringParams(
             max_bank_rad=math.radians(60.0), max_roll_rate_radps=math.radians(60.0), min_speed_mps=15.0,

@@ -180,7 +180,8 @@ def test_what_is_not_known_is_not_quiet() -> None:
     assert np.isnan(unknown.time_to_warning_s[Cause.MASKING]) or unknown.time_to_warning_s[Cause.MASKING] == 0.0
     assert once(epoch_of(EIGHT)).system[Cause.PREDICTION] == Level.CAUTION  # no plan
     nothing = once(epoch_of(np.full((3, 8), np.nan), plan=level_plan()))
-    assert nothing.system[Cause.PREDICTION] == Level.CAUTION and nothing.level == Level.WARNING
+    assert nothing.system[Cause.PREDICTION] == Level.CAUTION
+    assert nothing.level == Level.WARNING
     lost = replace(epoch_of(EIGHT, plan=level_plan()), cn0_dbhz=np.full(8, np.nan))
     assert once(lost).system[Cause.SIGNAL] == Level.WARNING
 

@@ -112,11 +112,13 @@ def test_the_loss_in_a_roll_comes_when_the_wing_is_as_high_as_the_satellite() ->
     _, found = predict(PredictionState(), epoch, PredictionParams(predictor="plan"))
     assert found.caution
     assert found.loss_s == pytest.approx(4.0, abs=0.2 + 1e-9)
-    assert found.satellite_loss_s[0] == found.loss_s and np.isinf(found.satellite_loss_s[1:]).all()
+    assert found.satellite_loss_s[0] == found.loss_s
+    assert np.isinf(found.satellite_loss_s[1:]).all()
     _, before = predict(
         PredictionState(), PredictionEpoch(**{**vars(epoch), "time_s": 5.5}), PredictionParams(predictor="plan")
     )
-    assert not before.caution and before.loss_s == math.inf
+    assert not before.caution
+    assert before.loss_s == math.inf
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -145,12 +147,15 @@ def test_what_is_not_known_is_said(name: str) -> None:
     _, found = predict(
         PredictionState(), PredictionEpoch(time_s=8.0, attitude=unknown, plan=plan, los_enu=los, mask=OPEN), params
     )
-    assert not found.available and found.restriction == "no_attitude" and math.isnan(found.loss_s)
+    assert not found.available
+    assert found.restriction == "no_attitude"
+    assert math.isnan(found.loss_s)
     _, found = predict(
         PredictionState(),
         PredictionEpoch(time_s=8.0, attitude=flying(), plan=plan, los_enu=np.full((3, 8), np.nan), mask=OPEN), params,
     )  # fmt: skip
-    assert not found.available and found.restriction == "no_satellites"
+    assert not found.available
+    assert found.restriction == "no_satellites"
     needs_plan = name in ("plan", "robust_plan", "likely_loss")
     for missing in (None, AttitudePlan.from_points([0.0, 9.0], [0.0, 0.0], [0.0, 0.0])):  # none, and one that ends
         _, found = predict(
@@ -158,7 +163,8 @@ def test_what_is_not_known_is_said(name: str) -> None:
             PredictionEpoch(time_s=8.0, attitude=flying(), plan=missing, los_enu=los, mask=OPEN),
             params,
         )
-        assert found.available and found.restriction == ("no_plan" if needs_plan else "")
+        assert found.available
+        assert found.restriction == ("no_plan" if needs_plan else "")
 
 
 def test_degrees_are_not_an_attitude() -> None:
@@ -178,7 +184,8 @@ def test_the_bank_flown_tells_how_late_and_how_wrong() -> None:
         epoch = PredictionEpoch(time_s=time_s, attitude=flying(bank_deg, rate), plan=plan, los_enu=los, mask=OPEN)
         state, _ = predict(state, epoch, params)
         if k in (122, 149):
-            assert state.weights is not None and state.weights.sum() == pytest.approx(1.0, abs=1e-9)
+            assert state.weights is not None
+            assert state.weights.sum() == pytest.approx(1.0, abs=1e-9)
             ways = hypotheses_of("likely_loss", params)
             late, error = ways.values[int(state.weights[:-1].argmax()), :2]
             if k == 122:  # rolling
@@ -193,4 +200,5 @@ def test_a_satellite_that_sets_is_not_counted_on() -> None:
         time_s=0.0, attitude=flying(), plan=None, los_enu=los, mask=OPEN, setting=np.array([True, False, False, False])
     )
     _, found = predict(PredictionState(), epoch, PredictionParams(predictor="hold"))
-    assert found.seen.all() and found.caution
+    assert found.seen.all()
+    assert found.caution

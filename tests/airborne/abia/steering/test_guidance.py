@@ -52,7 +52,10 @@ def test_the_smallest_change_that_keeps_the_satellite() -> None:
     turns by less than 15 degrees until the end of the horizon, which moves the bound by less than a step of 4.
     """
     found = asked(turn_plan())
-    assert found.commanded and found.keeps and found.reason == "avoid" and found.kind == "shallower"
+    assert found.commanded
+    assert found.keeps
+    assert found.reason == "avoid"
+    assert found.kind == "shallower"
     assert found.plan is not None
     steepest = math.degrees(np.abs(found.plan.bank_rad[:80]).max())
     assert 24.0 - 1e-6 <= steepest <= 28.0 + 1e-6
@@ -74,7 +77,9 @@ def test_the_planned_heading_is_rejoined() -> None:
 def test_after_a_loss_the_satellite_is_back_when_the_wing_is_down() -> None:
     """Banked 40 degrees: at the limit of 30 degrees a second the bank is below 30 less 3 for the error after 0.43 s."""
     found = asked(turn_plan(), time_s=10.0, bank_deg=40.0)
-    assert found.commanded and found.reason == "recover" and found.keeps
+    assert found.commanded
+    assert found.reason == "recover"
+    assert found.keeps
     assert found.time_s == pytest.approx((40.0 - 27.0) / 30.0, abs=0.2)
 
 
@@ -82,7 +87,8 @@ def test_commands_keep_within_the_aircraft() -> None:
     rng = np.random.default_rng(1)
     for _ in range(40):
         limits = SteeringParams(
-            max_bank_rad=math.radians(rng.uniform(30.0, 60.0)), max_roll_rate_radps=math.radians(rng.uniform(5.0, 40.0)),
+            max_bank_rad=math.radians(rng.uniform(30.0, 60.0)),
+            max_roll_rate_radps=math.radians(rng.uniform(5.0, 40.0)),
             max_load_factor=rng.uniform(1.3, 3.0), min_speed_mps=rng.uniform(90.0, 180.0), max_speed_mps=210.0,
         )  # fmt: skip
         plan = turn_plan(rng.uniform(25.0, 60.0))
@@ -109,7 +115,9 @@ def test_nothing_is_commanded_without_what_it_rests_on() -> None:
     assert asked(plan, los=np.full((3, 4), np.nan)).reason == "no_satellites"
     assert asked(turn_plan(at_s=50.0)).reason == "no_caution"
     for found in (asked(plan, height_m=250.0), asked(None)):
-        assert not found.commanded and found.plan is None and math.isnan(found.bank_rad)
+        assert not found.commanded
+        assert found.plan is None
+        assert math.isnan(found.bank_rad)
 
 
 def test_a_plan_that_is_the_best_is_left() -> None:
@@ -120,4 +128,5 @@ def test_a_plan_that_is_the_best_is_left() -> None:
 
 def test_a_small_step_finds_a_smaller_change() -> None:
     coarse, fine = asked(turn_plan()), asked(turn_plan(), limits=replace(LIMITS, share=0.02))
-    assert fine.keeps and fine.change_rad <= coarse.change_rad
+    assert fine.keeps
+    assert fine.change_rad <= coarse.change_rad

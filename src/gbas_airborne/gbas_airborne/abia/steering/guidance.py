@@ -147,7 +147,8 @@ def _outcome(way: Candidate, ahead: PredictionEpoch, look: PredictionParams, par
     empty = np.empty(0)
     flown = Hypotheses(
         kinds=np.full(len(errors), PLAN), values=np.array([(0.0, each, 1.0 / len(errors)) for each in errors]),
-        anchor_rad=0.0, horizon_margin_rad=0.0, caution_weight=0.0, shifts_s=empty, errors_rad=empty, prior_shift=empty, prior_error=empty,
+        anchor_rad=0.0, horizon_margin_rad=0.0, caution_weight=0.0,
+        shifts_s=empty, errors_rad=empty, prior_shift=empty, prior_error=empty,
     )  # fmt: skip
     los = usable_los(ahead.los_enu, look.elevation_mask_rad)
     if ahead.setting is not None:
