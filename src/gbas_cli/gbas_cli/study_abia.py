@@ -8,8 +8,10 @@ import typer
 
 from gbas_cli.base import Json, print_json
 from gbas_cli.campaign_options import Results, Scheduler, Workers, execution
+from gbas_core.errors import GbasError
 
 if TYPE_CHECKING:
+    from gbas_studies.abia.guided import Plan as GuidedPlan
     from gbas_studies.abia.scoring import Interval, Summary
 
 
@@ -23,6 +25,12 @@ def abia(
     seed: Annotated[int, typer.Option(help="Of the flights.", min=0)] = 1,
     required: Annotated[int, typer.Option(help="Satellites below which navigation is lost.", min=4, max=12)] = 5,
     minutes: Annotated[float, typer.Option(help="Of each flight.", min=1.0, max=600.0)] = 25.0,
+    guidance: Annotated[
+        str | None,
+        typer.Option(
+            metavar="AIRCRAFT", help="Fly with and without guidance instead: fighter, airliner or uav, 100 s a flight."
+        ),
+    ] = None,
     workers: Workers = 1,
     scheduler: Scheduler = None,
     out: Results = None,
@@ -36,7 +44,13 @@ def abia(
     from gbas_airborne.abia.prediction.params import PredictionParams
     from gbas_studies.abia import campaign
     from gbas_studies.abia.flights import FlightParams
+    from gbas_studies.abia.guided import run_guided, table
 
+    if guidance is not None:
+        guided = _guided_plan(guidance, required)
+        with execution("flying", workers=workers, scheduler=scheduler, out=out, quiet=as_json) as how:
+            print_json({guidance: table(run_guided(guided, flights=flights, seed=seed, execution=how))})
+        return
     plan = campaign.Plan(
         flights=FlightParams(duration_s=60.0 * minutes), prediction=PredictionParams(required_satellites=required)
     )
@@ -46,6 +60,15 @@ def abia(
         print_json(campaign.as_json(summaries))
     else:
         _print(summaries)
+
+
+def _guided_plan(aircraft: str, required: int) -> GuidedPlan:
+    from gbas_airborne.abia.prediction.params import PredictionParams
+    from gbas_studies.abia.guided import AIRCRAFT, Plan
+
+    if aircraft not in AIRCRAFT:
+        raise GbasError(f"--guidance {aircraft!r} is not one of {', '.join(AIRCRAFT)}")
+    return Plan(aircraft=aircraft, prediction=PredictionParams(required_satellites=required))
 
 
 def _print(summaries: dict[str, Summary]) -> None:

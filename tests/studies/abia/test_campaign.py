@@ -19,6 +19,8 @@ from gbas_cli.main import app
 from gbas_studies.abia.campaign import Plan, run_campaign
 from gbas_studies.abia.cautions import EVERY, NAMES, TIMES_A_SKY, counted_on, losses, probability
 from gbas_studies.abia.flights import TICK_S, FlightParams, FlownFlight, bank_profile, drawn_flight
+from gbas_studies.abia.guided import Plan as GuidedPlan
+from gbas_studies.abia.guided import run_guided, table
 from gbas_studies.abia.scoring import held, score, summary
 from gbas_studies.campaign import Execution
 
@@ -145,3 +147,13 @@ def test_the_command_prints_what_is_published() -> None:
     for each in rows:
         assert list(each) == ["name", "onsets", "lead_ge_2s", "missed", "false_share", "lead_s"]
         assert list(each["lead_s"]) == ["p5", "p50"]
+
+
+def test_guidance_costs_no_satellites_and_keeps_the_limits() -> None:
+    """Flights with losses: fewer seconds without satellites, no new loss, limits kept in each."""
+    pairs = run_guided(GuidedPlan(aircraft="fighter", prediction=PARAMS), flights=5, seed=1)
+    found = table(pairs)
+    assert found["loss_s"] > 0.0
+    assert found["guided_loss_s"] < 0.5 * found["loss_s"]
+    assert found["new_losses"] == 0
+    assert found["limits_kept"] == 5

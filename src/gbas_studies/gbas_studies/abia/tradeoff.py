@@ -1,4 +1,4 @@
-"""Lead against false cautions: each predictor a point, the likely loss a curve over the probability it cautions from."""
+"""Lead against false cautions: each predictor a point, the likely loss a curve over its probability of caution."""
 
 from __future__ import annotations
 
