@@ -57,7 +57,8 @@ def geometries(epoch: FlagEpoch, prediction: Prediction, params: FlagParams) -> 
     los = usable_los(epoch.ahead.los_enu, params.prediction.elevation_mask_rad)
     along = seen_at(outcome.attitudes_rad[int(outcome.weights.argmax())], los, epoch.ahead.mask)
     first = np.flatnonzero(np.append(True, (along[1:] != along[:-1]).any(axis=1)))
-    return Geometries(along[first], first * params.prediction.step_s)
+    first_s: FloatArray = np.asarray(first * params.prediction.step_s, dtype=np.float64)
+    return Geometries(along[first], first_s)
 
 
 def geometry_ahead(epoch: FlagEpoch, found: Geometries, params: FlagParams) -> GeometryAhead:
@@ -81,7 +82,8 @@ def levels_ahead(epoch: FlagEpoch, found: Geometries) -> LevelsAhead | None:
     approach = epoch.approach
     if approach is None or epoch.sigma_m is None:
         return None
-    spread = np.array([_position_sigmas_m(epoch, each, approach) for each in found.sets])
+    sigma_m = epoch.sigma_m
+    spread = np.array([_position_sigmas_m(epoch, np.where(each, sigma_m, np.nan), approach) for each in found.sets])
     levels = np.array([approach.vpl_m, approach.lpl_m]) * spread / spread[0]
     beyond = ~(levels <= np.array([approach.val_m, approach.lal_m])).all(axis=1)
     with np.errstate(invalid="ignore"):
@@ -89,16 +91,15 @@ def levels_ahead(epoch: FlagEpoch, found: Geometries) -> LevelsAhead | None:
     return LevelsAhead(float(worst[0]), float(worst[1]), _first(beyond, found))
 
 
-def _position_sigmas_m(epoch: FlagEpoch, used: BoolArray, approach: Approach) -> FloatArray:
-    """Standard deviation, vertical and lateral, with some satellites; NaN without a position."""
+def _position_sigmas_m(epoch: FlagEpoch, sigma_m: FloatArray, approach: Approach) -> FloatArray:
+    """Standard deviation, vertical and lateral, with the satellites that have a sigma; NaN without a position."""
     sine, cosine = math.sin(approach.course_rad), math.cos(approach.course_rad)
     turned = np.array([[sine, cosine, 0.0], [-cosine, sine, 0.0], [0.0, 0.0, 1.0]]) @ epoch.ahead.los_enu
-    sigma_m = np.where(used, epoch.sigma_m, np.nan)
     projection = projection_matrix(turned, sigma_m, epoch.clock_groups)
     if projection is None:
         return np.full(2, np.nan)
     both = np.stack(vertical_lateral(projection, approach.glide_path_rad))
-    result: FloatArray = np.sqrt((both**2 * np.where(used, sigma_m, 0.0) ** 2).sum(axis=1))
+    result: FloatArray = np.sqrt((both**2 * np.nan_to_num(sigma_m) ** 2).sum(axis=1))
     return result
 
 
