@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from gbas_cli import study_abia as cli_study_abia
 from gbas_cli import study_coverage as cli_study_coverage
 from gbas_cli import study_faults as cli_study_faults
 from gbas_cli import study_fronts as cli_study_fronts
@@ -20,6 +21,7 @@ study_app = typer.Typer(help="Sweeps and campaigns beyond the published ones.", 
 
 def register(app: typer.Typer) -> None:
     """Add the commands."""
+    cli_study_abia.register(study_app)
     cli_study_coverage.register(study_app)
     cli_study_faults.register(study_app)
     cli_study_fronts.register(study_app)
