@@ -276,8 +276,9 @@ def test_existing_bag_is_not_touched(recorder: Any, tmp_path: Path) -> None:
 def test_full_disk_ends_it_with_a_word(source: Source, recorder: Any, wait_until: Any) -> None:
     """A limit on the size of files stands for a disk that is full; what was written before can be saved."""
     process = recorder("compression:=none")
-    resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (40_000, 40_000))
     source.until_read(wait_until, RR[:1])
+    # Not before: files of the transport are larger. What the bag begins with is 50 kB.
+    resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (200_000, 200_000))
     stop = threading.Event()
 
     def publish() -> None:
