@@ -107,6 +107,32 @@ def test_first_measurement_carries_the_ephemeris_check() -> None:
     assert np.isnan(state.checks.crc[second])
 
 
+def test_p_d_is_of_the_issue_it_was_told_with() -> None:
+    """A new issue of data has none until a type 11 message tells it."""
+    satellite, other = SOURCE_ID_INDEX[5], SOURCE_ID_INDEX[6]
+
+    def type11(source: int) -> Type11:
+        values = {"prc_30_m": 1.0, "rrc_30_mps": 0.0, "sigma_pr_gnd_d_m": 0.3, "sigma_pr_gnd_30_m": 0.4}
+        return Type11(
+            modified_z_count_s=modified_z_count_s(TOW_S),
+            additional_message_flag=0,
+            ephemeris_decorrelation_d=1e-4,
+            measurements=(Correction30(ranging_source_id=source, **values),),
+        )
+
+    state, _ = received(frame(type1(5)), frame(type11(5), slot=1), frame(type11(6), slot=2), state=selected())
+    state, _ = received(frame(type1(5)), state=state)
+    assert state.p_d is not None
+    assert np.isfinite(state.p_d[[satellite, other]]).all()  # said again, nothing is new
+    state, _ = received(frame(type1(5, iod=34)), state=state)
+    assert state.p_d is not None
+    assert np.isnan(state.p_d[satellite])
+    assert np.isfinite(state.p_d[other])
+    state, _ = received(frame(type11(5), slot=1), state=state)
+    assert state.p_d is not None
+    assert np.isfinite(state.p_d[satellite])
+
+
 def test_unknown_sources_are_left_out() -> None:
     """SBAS and GLONASS sources are not on the suite's axis."""
     state, _ = received(frame(type1(40, 5, 120)), state=selected())

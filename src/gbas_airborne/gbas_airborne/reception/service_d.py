@@ -73,3 +73,12 @@ def with_decorrelation(p_d: FloatArray | None, message: Type11) -> FloatArray | 
     found = missing() if p_d is None else p_d.copy()
     found[index] = message.ephemeris_decorrelation_d
     return found
+
+
+def without_decorrelation(p_d: FloatArray | None, index: int) -> FloatArray | None:
+    """P_D without that of a satellite with another issue of data: what was said was of another orbit."""
+    if p_d is None or np.isnan(p_d[index]):
+        return p_d
+    left = p_d.copy()
+    left[index] = np.nan
+    return left

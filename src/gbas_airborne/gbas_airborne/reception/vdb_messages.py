@@ -16,7 +16,7 @@ from typing import Final
 from gbas_airborne.modes import PRODUCT_OF_MEASUREMENT
 from gbas_airborne.params import NO_FAS, AirborneParams
 from gbas_airborne.reception.second_frequency import PRODUCT_OF_PRIVATE, whole_set
-from gbas_airborne.reception.service_d import joined, with_decorrelation
+from gbas_airborne.reception.service_d import joined, with_decorrelation, without_decorrelation
 from gbas_airborne.reception.station_data import (
     EphemerisChecks,
     correction_set,
@@ -288,6 +288,8 @@ class _VdbMessageProcessor:
         told = (float(first.iod), float(message.ephemeris_crc), message.ephemeris_decorrelation)
         checks = self.state.checks
         if told != (checks.iod[index], checks.crc[index], checks.p[index]):
+            if first.iod != checks.iod[index]:
+                self.state.p_d = without_decorrelation(self.state.p_d, index)
             columns = checks.columns.copy()
             columns[:, index] = told
             self.state.checks = EphemerisChecks(columns=columns)
