@@ -38,16 +38,12 @@ def reproduce(options: Options) -> Reproduction:
         "recorded": lambda: recorded_section(options),
         "flags": flag_section,
     }
-    sections = []
-    for name, make in steps.items():
-        options.progress(name)
-        sections.append(make())
     return Reproduction(
         study="abia",
         title="Avionics based integrity augmentation",
         source=SOURCE,
         about=_ABOUT,
-        sections=sections,
+        sections=options.made(steps),
     )
 
 

@@ -56,16 +56,12 @@ def reproduce(options: Options) -> Reproduction:
         "fronts from elsewhere": lambda: projection_section(testbed, quick=options.quick, seed=options.seed),
         "recorded pairs": lambda: recorded_section(options),
     }
-    sections = []
-    for name, make in steps.items():
-        options.progress(name)
-        sections.append(make())
     return Reproduction(
         study="asigm",
         title="Absolute slant ionosphere gradient monitor and receiver siting",
         source=SOURCE,
         about=_ABOUT,
-        sections=sections,
+        sections=options.made(steps),
     )
 
 

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, cast
 
-from gbas_studies.reproduction.items import Reproduction
+from gbas_studies.reproduction.items import Reproduction, Section
 
 MODULES: Final[dict[str, str]] = {
     "ccd": "gbas_studies.ccd.reproduction",
@@ -52,6 +52,14 @@ class Options:
     quick: bool = False
     seed: int = 1
     progress: Callable[[str], None] = _silent
+
+    def made(self, steps: Mapping[str, Callable[[], Section]]) -> list[Section]:
+        """Sections, one after another, with progress told by their names."""
+        sections = []
+        for name, make in steps.items():
+            self.progress(name)
+            sections.append(make())
+        return sections
 
 
 Study = Callable[[Options], Reproduction]
